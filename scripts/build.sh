@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release), with ccache if it is installed.
+# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release). A new build folder uses ccache if it is
+# installed; another keeps its compiler as it is, since a change would compile all of it again.
 # Further arguments go to the build (--target NAME). On a terminal the progress stays on one line. Elsewhere the script
 # prints a line at each tenth of the steps. It always prints warnings and errors whole.
 set -euo pipefail
@@ -8,9 +9,9 @@ cd "$(dirname "$(realpath "$0")")/.."
 preset=${1:-release}
 [ $# -gt 0 ] && shift
 launcher=()
-if command -v ccache >/dev/null; then
+export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1  # clones in other folders share what ccache holds
+if command -v ccache >/dev/null && [ ! -e "build/$preset/CMakeCache.txt" ]; then
   launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
-  export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1  # clones in other folders share what it holds
 fi
 cmake --preset "$preset" "${launcher[@]}" >"/tmp/abs_hil_configure.$$" || { cat "/tmp/abs_hil_configure.$$"; exit 1; }
 rm -f "/tmp/abs_hil_configure.$$"

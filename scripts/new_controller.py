@@ -107,6 +107,7 @@ def in_tree(names):
 
 def build(test):
     run = lambda *command, **how: subprocess.run(command, cwd=ROOT, check=True, **how)
+    run('scripts/setup.sh', 'packages-tests.txt')
     run('scripts/build.sh', 'release', '--target', 'abs_hil_executable', test)
     program = ROOT / 'build' / 'release' / 'bin' / 'abs_hil'
     run(ROOT / 'build' / 'release' / 'tests' / test)
