@@ -115,6 +115,13 @@ def test_vector_environment():
     assert (ended >= 1).all(), 'each rig began again'
 
 
+def test_an_option_that_no_environment_has_is_refused():
+    vectors = gymnasium.make_vec(ID, num_envs=2, vectorization_mode='vector_entry_point', **QUICK)
+    for environment in (gymnasium.make(ID, **QUICK), vectors):
+        with pytest.raises(ValueError, match="'plant.theta_N' is none of this environment; give index"):
+            environment.reset(options={'plant.theta_N': 30})
+
+
 def test_randomised_plants_differ_and_bad_tasks_are_refused():
     rigs = Rigs(1, Task(vary='none', randomise={'plant.theta_N': (15.0, 30.0)}))
     slips = []

@@ -23,6 +23,14 @@ def action_space() -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(np.float32(0.0), np.float32(1.0), (1,), np.float32)
 
 
+def check_options(options: Mapping[str, Any] | None, *known: str) -> None:
+    """Raises ValueError for an option of `reset` that the environment does not have."""
+    for name in options or ():
+        if name not in known:
+            raise ValueError(f'options: {name!r} is none of this environment; give {" or ".join(known) or "none"}. Values of the '
+                             'configuration stand in gymnasium.make(..., set={...})')
+
+
 class SlipControl(gymnasium.Env):
     """Brake one simulated rig to 3 m/s and keep the wheel's slip at its reference.
 
@@ -57,8 +65,9 @@ class SlipControl(gymnasium.Env):
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
         """options: {"index": n} chooses plant n of the series."""
+        check_options(options, 'index')
         super().reset(seed=seed)
-        index = int(options['index']) if options and 'index' in options else int(self.np_random.integers(2**31))
+        index = int(options['index']) if options else int(self.np_random.integers(2**31))
         self._steps = 0
         return self._rigs.reset(0, index), {'index': index}
 
@@ -86,11 +95,12 @@ class SlipControlVector(VectorEnv):
         self._plants = np.zeros(num_envs, dtype=np.int64)
 
     def reset(self, *, seed: Any = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+        """options: {"index": [n, ...]} chooses the plant of each rig."""
+        check_options(options, 'index')
         super().reset(seed=seed)
         self._over[:] = False
         self._steps[:] = 0
-        """options: {"index": [n, ...]} chooses the plant of each rig."""
-        if options and 'index' in options:
+        if options:
             self._plants = np.broadcast_to(np.asarray(options['index'], dtype=np.int64), (self.num_envs,)).copy()
         else:
             self._plants = self.np_random.integers(2**31, size=self.num_envs)

@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 
 from ..options import Value, program, text_of
-from .environment import action_space, observation_space
+from .environment import action_space, check_options, observation_space
 from .rigs import CHANGE_PRICE, END_SPEED_M_S, FAULT_REWARD, HIGH, LOW
 
 #: AgentPage of src/interchange/agent_controller.hpp
@@ -72,7 +72,9 @@ class RigSlipControl(gymnasium.Env):
         self._bytes: mmap.mmap
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Ends a run that still goes on, and begins another. The rig draws nothing, so the seed has no effect on it."""
+        """Ends a run that still goes on, and begins another. The rig draws nothing, so the seed has no effect on it.
+        It has no options."""
+        check_options(options)
         super().reset(seed=seed)
         self._end()
         self._summary.unlink(missing_ok=True)
