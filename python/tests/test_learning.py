@@ -1,6 +1,8 @@
 """The learning environments: gymnasium's own checker, the same bits for the same seed, rewards as stated."""
 import copy
+import importlib
 import pickle
+import sys
 
 import gymnasium
 import numpy as np
@@ -113,6 +115,13 @@ def test_vector_environment():
         assert environment.observation_space.contains(observations)
         ended += terminated | truncated
     assert (ended >= 1).all(), 'each rig began again'
+
+
+def test_a_gymnasium_that_is_too_old_is_named_with_what_to_install(monkeypatch):
+    monkeypatch.delattr(gymnasium.vector, 'AutoresetMode')  # as before 1.1
+    monkeypatch.delitem(sys.modules, 'abs_hil.learning.environment', raising=False)
+    with pytest.raises(ImportError, match=r"gymnasium .* is too old.*pip install 'gymnasium>=1\.1'"):
+        importlib.import_module('abs_hil.learning.environment')
 
 
 def test_an_option_that_no_environment_has_is_refused():

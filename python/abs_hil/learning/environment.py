@@ -6,10 +6,16 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from ..missing import how_to_install
 from .rigs import HIGH, LOW, TRAINING_SEED, Rigs, Task
+
+try:
+    from gymnasium.vector import AutoresetMode, VectorEnv
+except ImportError:
+    newer = how_to_install("'gymnasium>=1.1'")
+    raise ImportError(f'abs_hil.learning: gymnasium {gymnasium.__version__} is too old; install a newer one: {newer}') from None
 
 #: the longest braking takes about 450 steps of 10 ms
 MOST_STEPS = 1000
