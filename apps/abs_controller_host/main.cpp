@@ -40,5 +40,5 @@ int main() {
     std::fputs("abs_controller_host: abs_hil starts this program by itself, for --controller FILE\n", stderr);
     return 2;
   }
-  return abs_hil::interchange::run_host([] { return allocations; });
+  return abs_hil::interchange::run_host(abs_hil::interchange::load_here, [] { return allocations; });
 }

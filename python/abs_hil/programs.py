@@ -14,7 +14,7 @@ PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn':
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
-            'lab': 'abs_hil.lab.program'}
+            'lab': 'abs_hil.lab.program', 'python_host': 'abs_hil.interchange.host'}
 
 
 class _Stdout(io.FileIO):
@@ -101,3 +101,7 @@ def serve() -> None:
 
 def lab() -> None:
     sys.exit(start('lab', sys.argv[1:]))
+
+
+def python_host() -> None:
+    sys.exit(start('python_host', sys.argv[1:]))

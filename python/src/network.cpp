@@ -3,18 +3,24 @@
 
 #include <poll.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <exception>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "commands/authority.hpp"
 #include "commands/sender.hpp"
 #include "interchange/foreign_controller.hpp"
+#include "interchange/host.hpp"
 #include "interchange/hosted_code.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/lcm_url.hpp"
@@ -107,6 +113,57 @@ py::dict controller_files(const std::string& program) {
   return makers;
 }
 
+/// A controller in Python, for run_host. What its methods raise ends the process: its traceback goes to stderr, and the
+/// run says in which step.
+class PythonCode final : public interchange::ForeignCode {
+ public:
+  /// @param parts  reset and step, which returns an abs_hil.SlipOutput, names of the signals, path of the module
+  explicit PythonCode(const py::tuple& parts) : reset_(parts[0]), step_(parts[1]) {
+    signals_ = parts[2].cast<std::vector<std::string>>();
+    source_ = parts[3].cast<std::string>();
+  }
+  void reset(const abs_hil_input& input) noexcept override {
+    ended_by_errors([&] { reset_(interchange::slip_input(input)); });
+  }
+  void step(const abs_hil_input& input, abs_hil_output& output) noexcept override {
+    ended_by_errors([&] {
+      output = interchange::foreign_output(step_(interchange::slip_input(input)).cast<control::SlipOutput>());
+    });
+  }
+
+ private:
+  template <class Call>
+  static void ended_by_errors(const Call& call) noexcept {
+    try {
+      call();
+    } catch (py::error_already_set& error) {
+      error.restore();
+      PyErr_PrintEx(0);  // of a SystemExit it ends the process itself
+      ::_exit(1);
+    } catch (const std::exception& error) {
+      static_cast<void>(std::fprintf(stderr, "%s\n", error.what()));
+      ::_exit(1);
+    }
+  }
+
+  py::object reset_, step_;
+};
+
+/// Serves a controller in Python to the run that started this process. @param make  "MODULE:CLASS" -> the parts of
+/// PythonCode
+int serve_controller(const py::function& make) {
+  return interchange::run_host(
+      [&make](const interchange::ForeignSetup& setup) -> std::unique_ptr<interchange::ForeignCode> {
+        try {
+          return std::make_unique<PythonCode>(py::tuple(make(setup.file.string())));
+        } catch (py::error_already_set& error) {  // its own text would have a traceback through this program
+          if (!error.matches(PyExc_ValueError)) throw;
+          throw std::invalid_argument(py::str(error.value()));
+        }
+      },
+      [] { return std::uint64_t{0}; });  // every step of Python allocates
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_network, module) {
@@ -122,4 +179,5 @@ PYBIND11_MODULE(_network, module) {
   module.def(
       "check_key", [](const std::string& file) { static_cast<void>(commands::read_key(file)); }, py::arg("file"));
   module.def("controller_files", &controller_files, py::arg("program"));
+  module.def("serve_controller", &serve_controller, py::arg("make"));
 }

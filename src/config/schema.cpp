@@ -47,7 +47,13 @@ Json list_of(Json items) { return {{"type", "array"}, {"items", std::move(items)
 Json files_of(const rig::FileEndings& files) {
   std::string pattern;
   for (const std::string_view ending : files.endings) {
-    if (!ending.empty()) pattern.append(pattern.empty() ? "" : "|").append(".\\").append(ending).append("$");
+    if (ending.empty()) continue;
+    pattern.append(pattern.empty() ? "" : "|");
+    if (ending == rig::FileEndings::python_class) {
+      pattern.append("^[A-Za-z0-9_.]+:[A-Za-z0-9_]+$");
+    } else {
+      pattern.append(".\\").append(ending).append("$");
+    }
   }
   return {{"type", "string"}, {"pattern", pattern}};
 }

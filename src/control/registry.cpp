@@ -65,8 +65,7 @@ std::vector<ControllerFiles>& file_table() noexcept {
 std::string unknown_name_message(std::string_view name) {
   if (name.find(':') != std::string_view::npos) {
     return "controller " + std::string(name) +
-           ": a class in Python runs in abs_hil benchmark, and in abs_hil.simulate and abs_hil.simulate_many of the "
-           "Python package, over the same plants (docs/python.md); here give a name or a file";
+           ": give a class in Python as MODULE:CLASS, with letters, digits and _ in both names; MODULE may have dots";
   }
   const auto nearest = std::ranges::min_element(
       table(), {}, [name](const ControllerEntry& entry) { return rig::edit_distance(name, entry.name); });
@@ -132,7 +131,7 @@ bool is_controller_file(std::string_view name) noexcept {
 std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context) {
   if (is_controller_file(name)) {
     for (const ControllerFiles& files : file_table()) {
-      if (name.ends_with(files.ending)) return files.make(std::string(name), context);
+      if (rig::FileEndings{{files.ending}}.fit(name)) return files.make(std::string(name), context);
     }
     throw std::invalid_argument("controller " + std::string(name) +
                                 ": this program takes no controllers from files; abs_hil does");

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "abs_hil/rig/option.hpp"
 #include "interchange/fmu_code.hpp"
 #include "interchange/library_code.hpp"
 #include "runtime/clock.hpp"
@@ -69,6 +70,12 @@ StepTimes warm_up(ForeignCode& code, double period_s, std::int64_t steps) {
 std::unique_ptr<ForeignCode> load_here(const ForeignSetup& setup) {
   if (setup.file.extension() == ".so") return load_library(setup);
   if (setup.file.extension() == ".fmu") return load_fmu(setup);
+  if (rig::FileEndings::is_python_class(setup.file.native())) {
+    throw std::invalid_argument(
+        setup.file.string() +
+        ": a class in Python cannot control a board, whose commands must come in time; write it "
+        "in C or C++ (docs/writing-a-controller.md), or use --backend sim");
+  }
   throw std::invalid_argument(setup.file.string() + ": give a shared library (.so) or an FMU (.fmu)");
 }
 

@@ -35,6 +35,8 @@ class ForeignCode {
   virtual void step(const abs_hil_input& input, abs_hil_output& output) noexcept = 0;
   /// Names of its own signals, at most ABS_HIL_CONTROLLER_SIGNALS.
   [[nodiscard]] const std::vector<std::string>& signals() const noexcept { return signals_; }
+  /// Path of the file with its code, if that is another one than it was made from; else empty.
+  [[nodiscard]] const std::string& source() const noexcept { return source_; }
   /// Why it gives no outputs any more; empty while it does. Not real-time safe.
   [[nodiscard]] virtual std::string failure() const { return {}; }
   /// After `reset` and `step` were called to warm it up: makes the next `reset` cheap. Not real-time safe.
@@ -42,6 +44,7 @@ class ForeignCode {
 
  protected:
   std::vector<std::string> signals_{};
+  std::string source_{};
 };
 
 /// Durations of steps, ns.

@@ -39,7 +39,7 @@ ForeignSetup setup_of(const std::string& file, const control::ControllerContext&
 
 /// An FMU, unpacked, if it is one. Its description can be checked without running the file's code.
 std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
-  if (setup.file.extension() == ".so") return nullptr;
+  if (setup.file.extension() != ".fmu") return nullptr;
   auto fmu = std::make_unique<ExtractedFmu>(setup.file);
   setup.folder = fmu->folder();
   static_cast<void>(facts_of(setup.file, setup.folder, setup.mapping));
@@ -65,6 +65,32 @@ abs_hil_input foreign_input(const control::SlipInput& in, double time_s) noexcep
 }
 
 }  // namespace
+
+control::SlipInput slip_input(const abs_hil_input& in) noexcept {
+  return {.dt_s = in.dt_s,
+          .speeds = {in.omega1_rad_s, in.omega2_rad_s},
+          .slip = in.slip,
+          .slip_ref = in.slip_ref,
+          .mean_brake_torque_Nm = in.mean_brake_torque_Nm,
+          .brake_torque_Nm = in.brake_torque_Nm,
+          .max_brake_torque_Nm = in.max_brake_torque_Nm,
+          .alpha1_rad_s2 = in.alpha1_rad_s2,
+          .alpha2_rad_s2 = in.alpha2_rad_s2,
+          .upper_travel_rad = in.upper_travel_rad,
+          .lower_travel_rad = in.lower_travel_rad,
+          .sent_brake_torque_Nm = in.sent_brake_torque_Nm,
+          .unsent_torque_Nm = in.unsent_torque_Nm};
+}
+
+abs_hil_output foreign_output(const control::SlipOutput& out) noexcept {
+  abs_hil_output output{.brake_torque_Nm = out.brake_torque_Nm,
+                        .slip_velocity_error_m_s = out.slip_velocity_error_m_s,
+                        .theta_est_N = out.theta_est_N,
+                        .slip_ref = out.slip_ref,
+                        .signals = {}};
+  for (std::size_t n = 0; n < rig::signal_max; ++n) output.signals[n] = out.signals[n];
+  return output;
+}
 
 ForeignController::ForeignController(const std::string& file, const control::ControllerContext& context, Home home)
     : file_(file),
@@ -124,12 +150,12 @@ ForeignTrial ForeignController::try_out() {
   return trial;
 }
 
-std::array<control::ControllerFiles, 2> foreign_controllers() noexcept {
+std::array<control::ControllerFiles, 3> foreign_controllers() noexcept {
   const auto make = [](const std::string& file,
                        const control::ControllerContext& context) -> std::unique_ptr<control::SlipController> {
     return std::make_unique<ForeignController>(file, context, chosen_home.load());
   };
-  return {{{".so", make}, {".fmu", make}}};
+  return {{{".so", make}, {".fmu", make}, {rig::FileEndings::python_class, make}}};
 }
 
 void register_foreign_controllers() {

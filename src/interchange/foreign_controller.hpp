@@ -39,6 +39,8 @@ class ForeignController final : public control::SlipController {
   [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override { return signals_; }
 
   [[nodiscard]] const std::string& file() const noexcept { return file_; }
+  /// The file with its code: of a class in Python, its module's.
+  [[nodiscard]] std::string source() const { return code_->source().empty() ? file_ : code_->source(); }
   /// Runs the code over trial inputs, in a process of its own first. Call it before anything moves. Throws
   /// std::invalid_argument if the code dies in it, or if its steps take longer than the control period.
   [[nodiscard]] ForeignTrial try_out();
@@ -57,9 +59,13 @@ class ForeignController final : public control::SlipController {
   double time_s_{0.0};
 };
 
+/// What a law is told and answers, in the terms of the C interface.
+[[nodiscard]] control::SlipInput slip_input(const abs_hil_input& in) noexcept;
+[[nodiscard]] abs_hil_output foreign_output(const control::SlipOutput& out) noexcept;
+
 /// What makes controllers from files (docs/interchange.md). Their code runs in a process of its own until `set_home`
 /// says otherwise.
-[[nodiscard]] std::array<control::ControllerFiles, 2> foreign_controllers() noexcept;
+[[nodiscard]] std::array<control::ControllerFiles, 3> foreign_controllers() noexcept;
 /// Lets the registry make them, and those of agents.
 void register_foreign_controllers();
 void set_home(Home home) noexcept;

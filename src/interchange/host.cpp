@@ -55,7 +55,8 @@ ForeignSetup setup_of(const nlohmann::json& json) {
 
 }  // namespace
 
-int run_host(const std::function<std::uint64_t()>& allocations) {
+int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup&)>& make,
+             const std::function<std::uint64_t()>& allocations) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what foreign code prints must not mix with the program's results
   std::string packet(host_packet_max, '\0');
@@ -67,12 +68,12 @@ int run_host(const std::function<std::uint64_t()>& allocations) {
     if (const std::string why = confine(host_socket); !why.empty()) {
       throw std::runtime_error("this kernel cannot confine a controller from a file (" + why + ")");
     }
-    code = load_here(setup_of(nlohmann::json::parse(packet)));
+    code = make(setup_of(nlohmann::json::parse(packet)));
   } catch (const std::exception& error) {
     static_cast<void>(send_json({{"error", error.what()}}));
     return 2;
   }
-  if (!send_json({{"signals", code->signals()}})) return 2;
+  if (!send_json({{"signals", code->signals()}, {"source", code->source()}})) return 2;
   runtime::MonotonicClock clock;
   HostRequest request;
   while (::recv(host_socket, &request, sizeof request, 0) == static_cast<ssize_t>(sizeof request)) {

@@ -8,7 +8,8 @@ namespace abs_hil::interchange {
 
 /// File descriptor of the host's socket (SOCK_SEQPACKET). The first packet is the setup as JSON, and its answer is
 /// JSON:
-/// {"signals": [...]} or {"error": "..."}. Then each packet is a HostRequest, and its answer a HostAnswer.
+/// {"signals": [...], "source": "..."} or {"error": "..."}. Then each packet is a HostRequest, and its answer a
+/// HostAnswer.
 inline constexpr int host_socket = 3;
 inline constexpr std::size_t host_packet_max = 65'536;
 

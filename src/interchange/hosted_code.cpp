@@ -18,6 +18,7 @@
 #include <string_view>
 #include <utility>
 
+#include "abs_hil/rig/option.hpp"
 #include "interchange/confinement.hpp"
 #include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
@@ -29,6 +30,7 @@ namespace abs_hil::interchange {
 
 namespace {
 
+constexpr std::string_view python_host = "abs_python_host";
 constexpr int step_limit_ms = 2'000;
 constexpr int start_limit_ms = 20'000;
 /// All steps of a run may take this long and this many times as long as the time that they simulate.
@@ -55,7 +57,7 @@ pid_t spawn(const std::string& program, int socket, int prints) {
   posix_spawn_file_actions_adddup2(&actions, prints, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, prints, STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&actions, socket, host_socket);
-  std::string name = "abs_controller_host";
+  std::string name = std::filesystem::path(program).filename().string();
   std::array<char*, 2> arguments{name.data(), nullptr};
   pid_t pid = 0;
   const int error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
@@ -63,8 +65,8 @@ pid_t spawn(const std::string& program, int socket, int prints) {
   posix_spawnattr_destroy(&attributes);
   if (error != 0) {
     throw std::runtime_error(
-        fmt::format("{}: {}: controllers from files run in it; install it in the folder of abs_hil", program,
-                    std::strerror(error)));
+        fmt::format("{}: {}: controllers from files run in it; install it in the folder of abs_hil{}", program,
+                    std::strerror(error), name == python_host ? ", with the Python package" : ""));
   }
   return pid;
 }
@@ -83,11 +85,12 @@ std::filesystem::path& program_of_the_host() {
 
 void set_host_beside(const std::string& program) { program_of_the_host() = program; }
 
-std::string host_program() {
+std::string host_program(const std::filesystem::path& file) {
   std::error_code error;
   const std::filesystem::path& told = program_of_the_host();
   const std::filesystem::path self = told.empty() ? std::filesystem::read_symlink("/proc/self/exe", error) : told;
-  constexpr const char* name = "abs_controller_host";
+  const std::string_view name =
+      rig::FileEndings::is_python_class(file.native()) ? python_host : std::string_view("abs_controller_host");
   const std::filesystem::path beside = self.parent_path() / name;
   // An installation may have been moved as a whole. A program that embeds the library uses the installed one.
   const std::filesystem::path moved = self.parent_path().parent_path() / ABS_HIL_HOST_DIR / name;
@@ -113,10 +116,11 @@ HostedCode::HostedCode(const ForeignSetup& setup) : period_s_(setup.period_s) {
     if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
     prints_ = pipe[0];
     ::fcntl(prints_, F_SETFL, O_NONBLOCK);
-    pid_ = spawn(host_program(), ends[1], pipe[1]);
+    pid_ = spawn(host_program(setup.file), ends[1], pipe[1]);
     close_theirs();
+    const bool in_python = rig::FileEndings::is_python_class(setup.file.native());
     const std::string text = nlohmann::json{
-        {"file", std::filesystem::absolute(setup.file).string()},
+        {"file", in_python ? setup.file.string() : std::filesystem::absolute(setup.file).string()},
         {"folder", setup.folder.string()},
         {"mapping", setup.mapping.empty() ? std::string() : std::filesystem::absolute(setup.mapping).string()},
         {"period_s", setup.period_s},
@@ -133,6 +137,7 @@ HostedCode::HostedCode(const ForeignSetup& setup) : period_s_(setup.period_s) {
       const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
       if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
       signals_ = json.at("signals").get<std::vector<std::string>>();
+      source_ = json.at("source").get<std::string>();
     } catch (const nlohmann::json::exception&) {
       throw std::invalid_argument(
           fmt::format("{}: while it was loaded and made, its code sent an answer of its own", setup.file.string()));

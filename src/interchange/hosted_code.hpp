@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -10,7 +11,7 @@
 
 namespace abs_hil::interchange {
 
-/// Foreign code in a process of its own, abs_controller_host: what it breaks, it breaks there. The process is confined
+/// Foreign code in a process of its own (`host_program`): what it breaks, it breaks there. The process is confined
 /// (confinement.hpp), so nothing of the code outlives this object. Every call has a limit of time, and so have all
 /// calls together: 10 s and a hundred times the time that the run simulates. What the code prints goes to stderr, up to
 /// a limit. A step costs two changes of process (about 20 us). Not for boards: `step` waits for the other process.
@@ -62,7 +63,8 @@ class HostedCode final : public ForeignCode {
 /// for. Call it before any controller is made.
 void set_host_beside(const std::string& program);
 
-/// Path of the host's program: abs_controller_host beside the running program, otherwise the installed one.
-[[nodiscard]] std::string host_program();
+/// Path of the host's program, beside the running program, otherwise the installed one: abs_controller_host, for a
+/// class in Python abs_python_host of the Python package.
+[[nodiscard]] std::string host_program(const std::filesystem::path& file);
 
 }  // namespace abs_hil::interchange

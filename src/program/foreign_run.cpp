@@ -22,7 +22,7 @@ ForeignRun::ForeignRun(bool on_rig) : on_rig_(on_rig) {
 void ForeignRun::look_at(control::SlipController& controller, bool try_out) {
   controller_ = dynamic_cast<interchange::ForeignController*>(&controller);
   if (controller_ == nullptr) return;
-  sha256_ = run_folder::sha256_of_file(controller_->file());
+  sha256_ = run_folder::sha256_of_file(controller_->source());
   if (!try_out) return;
   trial_ = controller_->try_out();
   const interchange::Offences& found = trial_->offences;

@@ -101,7 +101,7 @@ std::string valid_of(const config::Key& key) {
   if (key.allowed.empty()) return "text";
   std::string text = fmt::format("{}", fmt::join(key.allowed.list(), " | "));
   for (const std::string_view ending : key.files.endings) {
-    if (!ending.empty()) text.append(" | FILE").append(ending);
+    if (!ending.empty()) text.append(ending.starts_with('.') ? " | FILE" : " | ").append(ending);
   }
   return text;
 }

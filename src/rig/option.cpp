@@ -68,7 +68,9 @@ std::string valid_name_text(const OptionFacts& facts) {
   for (const std::string_view name : facts.allowed.list()) text.append(text.empty() ? "one of " : ", ").append(name);
   bool first = true;
   for (const std::string_view ending : facts.files.endings) {
-    if (!ending.empty()) text.append(std::exchange(first, false) ? ", or a file *" : " or *").append(ending);
+    if (ending.empty()) continue;
+    text.append(std::exchange(first, false) ? ", or a file " : " or ").append(ending.starts_with('.') ? "*" : "");
+    text.append(ending);
   }
   return text.empty() ? "text" : text;
 }

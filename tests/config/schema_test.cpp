@@ -32,7 +32,7 @@ TEST_CASE("the schema knows the configuration keys that a script may set, with t
   CHECK(control["slip_ref"]["exclusiveMaximum"] == 1);
   CHECK(control["adaptive"]["properties"]["gamma"]["maximum"] == 1e4);
   CHECK(control["controller"]["anyOf"][0]["enum"][0] == "adaptive");
-  CHECK(control["controller"]["anyOf"][1]["pattern"] == ".\\.so$|.\\.fmu$|.\\.agent$");
+  CHECK(control["controller"]["anyOf"][1]["pattern"] == ".\\.so$|.\\.fmu$|.\\.agent$|^[A-Za-z0-9_.]+:[A-Za-z0-9_]+$");
   CHECK(settings["plant"]["properties"]["ideal_actuator"]["type"] == "boolean");
   for (const char* foreign : {"driver", "realtime", "guardian", "commands"}) CHECK_FALSE(settings.contains(foreign));
   CHECK_FALSE(settings["experiment"]["properties"].contains("name"));

@@ -310,7 +310,7 @@ class OwnOptions {
 struct ControlOptions {
   ABS_HIL_OPTIONS(ControlOptions);
   ABS_HIL_OPTION(std::string, controller, "adaptive", .meaning = "slip controller", .allowed = controller_name,
-                 .files = {".so", ".fmu", ".agent"});
+                 .files = {".so", ".fmu", ".agent", rig::FileEndings::python_class});
   ABS_HIL_OPTION(double, rate_Hz, 1000.0, .unit = "Hz", .meaning = "control cycles per second",
                  .range = rig::between(100, 10'000));
   ABS_HIL_OPTION(double, slip_ref, 0.15, .meaning = "wanted slip", .range = rig::open_between(0, 1));

@@ -58,12 +58,27 @@ class AllowedNames {
 
 /// Endings of file names, each with its dot. A text that ends in one of them names a file.
 struct FileEndings {
-  std::array<std::string_view, 3> endings{};
+  /// In place of an ending: a class in Python, as in "my_laws:Gentle".
+  static constexpr std::string_view python_class = "MODULE:CLASS";
+  std::array<std::string_view, 4> endings{};
   [[nodiscard]] constexpr bool fit(std::string_view text) const noexcept {
     for (const std::string_view ending : endings) {
-      if (!ending.empty() && text.size() > ending.size() && text.ends_with(ending)) return true;
+      if (ending == python_class ? is_python_class(text)
+                                 : !ending.empty() && text.size() > ending.size() && text.ends_with(ending))
+        return true;
     }
     return false;
+  }
+  /// Two names with a colon between them, letters, digits and '_', and dots in the first.
+  [[nodiscard]] static constexpr bool is_python_class(std::string_view text) noexcept {
+    const std::size_t colon = text.find(':');
+    if (colon == 0 || colon == std::string_view::npos || colon + 1 == text.size()) return false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      const char c = text[i];
+      const bool of_a_name = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+      if (!of_a_name && i != colon && !(c == '.' && i < colon)) return false;
+    }
+    return true;
   }
 };
 

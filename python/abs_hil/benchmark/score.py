@@ -1,9 +1,7 @@
 """Runs the cases of the benchmark and scores a controller (docs/benchmark.md)."""
 from __future__ import annotations
 
-import importlib
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..figures import OVERSHOOT
+from ..interchange.host import made
 from ..options import Value
 from ..simulation import keys, simulate, simulate_many
 from .adhesion import least_time_s
@@ -32,14 +31,7 @@ class Entry:
 
     def made(self) -> Any:
         """A new object of the class. Raises ValueError."""
-        module, _, name = self.name.partition(':')
-        if '' not in sys.path:
-            sys.path.append('')  # the folder in which the program was started, as of `python -m`
-        try:
-            return getattr(importlib.import_module(module), name)()
-        except (ImportError, AttributeError, TypeError) as error:
-            raise ValueError(f'controller "{self.name}": {error}; give MODULE:CLASS, a class that is made without '
-                             'arguments, in this folder or on PYTHONPATH') from None
+        return made(self.name)
 
 
 def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
