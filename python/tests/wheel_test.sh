@@ -33,7 +33,8 @@ echo
 env/bin/abs_report --help >/dev/null
 env/bin/abs_export-fmu --controller pi --out pi.fmu
 env/bin/python -m zipfile -l pi.fmu | grep -o 'binaries/[^ ]*'
-env/bin/pip --disable-pip-version-check --quiet install -c lowest.txt pytest
+env/bin/pip --disable-pip-version-check --quiet install -c lowest.txt pytest fmpy
+env/bin/python -c 'import fmpy; fmpy.simulate_fmu("pi.fmu", stop_time=0.1)' # its end shows whether the FMU was unloaded whole
 export ABS_HIL_BUILD=$source/build/release PYTHONDONTWRITEBYTECODE=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=agg
 # Not those of a network, of controllers from files, of optional packages, nor the two that take minutes.
 env/bin/python -m pytest -q -p no:cacheprovider "$source"/python/tests/test_{bits,simulate,controllers,files,load,nesting,rows,eccentricity,report_parts,studies,tune}.py
