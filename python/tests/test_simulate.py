@@ -191,15 +191,20 @@ def test_an_exception_in_the_progress_ends_the_study():
         abs_hil.simulate_many({'seed': [1, 2, 3], 'experiment.start_speed_rad_s': [50.0]}, progress=progress)
 
 
-def test_a_series_is_that_of_the_program(tmp_path, abs_hil_program):
+OWN_PHASE = '[[phase]]\nname = "stop"\nbrake = "controller"\nuntil = { standstill = true }\nat_most_s = 60\n'
+
+
+@pytest.mark.parametrize('head, phases', [('experiments = ["paper", "brake-step"]\n', ''), ('', OWN_PHASE)],
+                         ids=['of others', 'of itself'])
+def test_a_series_is_that_of_the_program(tmp_path, abs_hil_program, head, phases):
     file = tmp_path / 'two.toml'
-    file.write_text('description = "two slips, two seeds"\n[series]\nexperiments = ["paper", "brake-step"]\nrepeat = 2\n'
-                    '[factors]\n"control.slip_ref" = [0.1, 0.2]\n')
+    file.write_text(f'description = "two slips, two seeds"\n[series]\n{head}repeat = 2\n'
+                    f'[factors]\n"control.slip_ref" = [0.1, 0.2]\n{phases}')
     series = abs_hil.simulate_series(file, set=QUICK)
     abs_hil_program('--fast', '--no-lcm', '--experiment', file, '--set', 'experiment.start_speed_rad_s=170', '--out',
                     tmp_path / 'out')
     of_program = abs_hil.load_series(tmp_path / 'out')
-    assert len(series) == len(of_program) == 8
+    assert len(series) == len(of_program) == (4 if phases else 8)
     assert series.index['runs'] == of_program.index['runs']
     for ours, theirs in zip(series, of_program):
         for name, values in theirs.columns.items():

@@ -231,7 +231,11 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options, const
   name = options.experiment.value_or(name);
   look_at_texts(options.assignments);
   look(options.changes);
-  return config::find(name);
+  std::shared_ptr<const config::Script> script = config::find(name);
+  if (!options.one_of_series) return script;
+  auto single = std::make_shared<config::Script>(*script);
+  single->series.given = false;
+  return single;
 }
 
 /// All of `request` but the texts of the configuration.
@@ -308,6 +312,9 @@ RunOptions options_of(const RunOptions& common, const config::SeriesMember& memb
   RunOptions options = common;
   for (const auto& [key, value] : member.varied) options.changes.push_back({key, value, "[vary]"});
   options.changes.push_back({"run.seed", member.seed, "[series]"});
+  // An experiment that the series names is a script of its own: refuse_nested sees whether that is a series, too.
+  options.one_of_series =
+      std::ranges::none_of(member.varied, [](const auto& varied) { return varied.first == experiment_key; });
   return options;
 }
 

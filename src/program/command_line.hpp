@@ -47,6 +47,7 @@ struct RunOptions {
   std::vector<std::string> defaults{};  ///< assignments of lowest priority, below files and options
   std::vector<std::string> assignments{};
   std::vector<config::FileValue> changes{};  ///< values as they are, above all others: of a study, a series, Python
+  bool one_of_series{false};                 ///< the run's script is one run of the series that its file describes
   bool wait_for_start{false};
   std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
   std::optional<std::string> realtime{};  ///< --rt; none: require on a real board, otherwise prefer
