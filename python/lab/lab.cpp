@@ -16,12 +16,12 @@
 #include "abs_hil/rig/quantities.hpp"
 #include "abs_hil/rig/reason.hpp"
 #include "analysis/braking_figures.hpp"
-#include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "files.hpp"
 #include "program/command_line.hpp"
+#include "rig/gate_counts.hpp"
 #include "rig/record_sink.hpp"
 #include "run/run_summary.hpp"
 #include "telemetry/csv_sink.hpp"
@@ -101,6 +101,9 @@ Json tables() {
   for (int phase = 0; phase <= static_cast<int>(rig::Phase::fault); ++phase) {
     all["phases"].push_back(rig::name_of(static_cast<rig::Phase>(phase)));
   }
+  for (std::size_t action = 0; action < rig::gate_action_count; ++action) {
+    all["gate_actions"].push_back(rig::name_of(static_cast<rig::GateAction>(action)));
+  }
   return all;
 }
 
@@ -129,6 +132,16 @@ class Rows final : public rig::RecordSink {
     for (std::size_t n = 0; n < rig::signal_max; ++n) (column++)->values.push_back(record.control.signals[n]);
     records_.emplace_back(record, distance_m);
   }
+  /// After each cycle: what the gate has counted so far. Keeps the cycle's actions, a bit for each.
+  void note_gate(const rig::GateCounts& counts) {
+    std::uint16_t actions = 0;
+    for (std::size_t n = 0; n < counts.size(); ++n) {
+      if (counts[n] != counted_[n]) actions = static_cast<std::uint16_t>(actions | 1U << n);
+    }
+    gate_.push_back(actions);
+    counted_ = counts;
+  }
+  [[nodiscard]] std::uintptr_t gate_address() const noexcept { return reinterpret_cast<std::uintptr_t>(gate_.data()); }
   [[nodiscard]] std::size_t size() const noexcept { return records_.size(); }
   [[nodiscard]] Json columns(const std::vector<std::string>& signals) {
     Json all = Json::array();
@@ -171,6 +184,8 @@ class Rows final : public rig::RecordSink {
   };
   std::vector<Column> columns_;
   std::vector<std::pair<rig::CycleRecord, double>> records_;
+  std::vector<std::uint16_t> gate_;
+  rig::GateCounts counted_{};
 };
 
 struct Answer {
@@ -185,56 +200,36 @@ Answer& answer() {
 }
 
 /// @param words  as on the command line: ["--controller", "adaptive", "--set", "control.slip_ref=0.2"]
-program::RunOptions options_of(const Json& words) {
-  program::RunOptions options;
-  for (std::size_t n = 0; n + 1 < words.size(); n += 2) {
-    const std::string option = words[n];
-    const std::string value = words[n + 1];
-    if (option == "--controller")
-      options.controller = value;
-    else if (option == "--plant")
-      options.plant = value;
-    else if (option == "--model")
-      options.model = value;
-    else if (option == "--experiment")
-      options.experiment = value;
-    else if (option == "--config")
-      options.config_file = value;
-    else if (option == "--seed")
-      options.seed = value;
-    else if (option == "--slip-ref")
-      options.slip_ref = value;
-    else if (option == "--set")
-      options.assignments.push_back(value);
-    else
-      throw config::ConfigError("the lab has no option " + option);
-  }
-  options.outputs.fast = true;
-  options.outputs.no_lcm = true;
-  return options;
-}
-
-Json run(const Json& words) {
+Json run(const std::vector<std::string>& words) {
   Answer& a = answer();
   a.rows.emplace();
-  const program::RunRequest request = program::merge(options_of(words));
-  run::Simulation simulation =
-      run::simulate(request.settings, *request.script, {&*a.rows}, [] { return rig::Reason::none; });
-  a.names = simulation.names;
+  const program::RunRequest request = program::merge(program::options_of(words));
+  run::require_simulated(request.settings, *request.script);
+  const run::Prepared prepared(request.settings, *request.script);
+  run::Run run(prepared);
+  run.record_into({&*a.rows});
+  run.begin();
+  for (bool more = true; more;) {
+    more = run.cycle();
+    a.rows->note_gate(run.gate().counts());
+  }
+  const analysis::RunSummary summary = run::summarise(run, run.outcome());
+  a.names = run.names();
   Json phases = Json::array();
   for (const rig::NamedPhase& phase : a.names.phases) {
     phases.push_back({{"kind", rig::name_of(phase.kind)}, {"name", phase.name}});
   }
   Json figures = Json::object();
   for (const analysis::Figure& figure : analysis::figures) {
-    figures[std::string(figure.name)] = figure.of(simulation.summary.metrics);
+    figures[std::string(figure.name)] = figure.of(summary.metrics);
   }
   return {{"rows", a.rows->size()},
           {"columns", a.rows->columns(a.names.signals)},
+          {"gate", a.rows->gate_address()},
           {"phases", std::move(phases)},
           {"events", a.rows->events(a.names)},
           {"figures", std::move(figures)},
-          {"summary", analysis::to_json(simulation.summary)},
+          {"summary", analysis::to_json(summary)},
           {"config", Json::parse(request.config_json)}};
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -306,6 +307,24 @@ nlohmann::ordered_json varied_json(const config::SeriesMember& member) {
     std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
   }
   return json;
+}
+
+RunOptions options_of(const std::vector<std::string>& words) {
+  RunOptions options{.outputs = {.fast = true, .no_lcm = true}};
+  const std::map<std::string_view, std::optional<std::string>*> named{
+      {"--config", &options.config_file}, {"--controller", &options.controller}, {"--experiment", &options.experiment},
+      {"--model", &options.model},        {"--plant", &options.plant},           {"--seed", &options.seed},
+      {"--slip-ref", &options.slip_ref}};
+  for (std::size_t n = 0; n + 1 < words.size(); n += 2) {
+    if (words[n] == "--set") {
+      options.assignments.push_back(words[n + 1]);
+    } else if (const auto known = named.find(words[n]); known != named.end()) {
+      *known->second = words[n + 1];
+    } else {
+      throw config::ConfigError("a run from words has no option " + words[n]);
+    }
+  }
+  return options;
 }
 
 RunOptions options_of(const RunOptions& common, const config::SeriesMember& member) {

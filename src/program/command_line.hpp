@@ -84,6 +84,9 @@ struct RunRequest {
   std::function<void()> stop_was_sent{};
 };
 
+/// The options of a run in virtual time without files, from pairs of words: "--controller", "adaptive", "--set",
+/// "control.slip_ref=0.2". Knows those that choose what is computed. Throws config::ConfigError for any other.
+[[nodiscard]] RunOptions options_of(const std::vector<std::string>& words);
 /// The options of one run of a series.
 [[nodiscard]] RunOptions options_of(const RunOptions& common, const config::SeriesMember& member);
 /// Its varied values as a JSON object.

@@ -98,8 +98,7 @@ analysis::RunSummary summarise(const Run& run, const RunOutcome& outcome,
           .end_speed_m_s = s.experiment.end_speed_m_s};
 }
 
-Simulation simulate(const config::Settings& s, const config::Script& script, const std::vector<rig::RecordSink*>& sinks,
-                    const Run::Poll& poll) {
+void require_simulated(const config::Settings& s, const config::Script& script) {
   if (s.on_rig()) throw config::ConfigError("backend rig: only the simulated rig runs here; leave out the backend");
   if (s.experiment.wait_for_start) {
     throw config::ConfigError("experiment.wait_for_start: a run in virtual time cannot wait; leave it out");
@@ -108,6 +107,11 @@ Simulation simulate(const config::Settings& s, const config::Script& script, con
     throw config::ConfigError("experiment " + script.name +
                               ": a series of runs, and this is one run; give an experiment without [series]");
   }
+}
+
+Simulation simulate(const config::Settings& s, const config::Script& script, const std::vector<rig::RecordSink*>& sinks,
+                    const Run::Poll& poll) {
+  require_simulated(s, script);
   const Prepared prepared(s, script);
   Run run(prepared);
   run.record_into(sinks);

@@ -17,6 +17,9 @@ namespace abs_hil::run {
 [[nodiscard]] analysis::RunSummary summarise(const Run& run, const RunOutcome& outcome,
                                              const nlohmann::ordered_json& foreign_controller = {});
 
+/// Throws config::ConfigError unless these settings are one run that can be made in virtual time.
+void require_simulated(const config::Settings& settings, const config::Script& script);
+
 /// A run in virtual time that left its records in the caller's sinks.
 struct Simulation {
   rig::RunNames names{};

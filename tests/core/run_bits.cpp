@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <exception>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -39,30 +40,10 @@ class Records : public rig::RecordSink {
   std::vector<std::pair<rig::CycleRecord, double>> rows_;
 };
 
-program::RunOptions options_of(const std::string& words) {
-  program::RunOptions options;
-  std::istringstream text(words);
-  for (std::string option, value; text >> option >> value;) {
-    if (option == "--controller")
-      options.controller = value;
-    else if (option == "--plant")
-      options.plant = value;
-    else if (option == "--experiment")
-      options.experiment = value;
-    else if (option == "--seed")
-      options.seed = value;
-    else if (option == "--set")
-      options.assignments.push_back(value);
-    else
-      throw std::invalid_argument("the table of runs has an unknown option " + option);
-  }
-  options.outputs.fast = true;
-  options.outputs.no_lcm = true;
-  return options;
-}
-
 std::string rows_of_run(const std::string& words) {
-  const program::RunRequest request = program::merge(options_of(words));
+  std::istringstream text(words);
+  const std::vector<std::string> options{std::istream_iterator<std::string>(text), {}};
+  const program::RunRequest request = program::merge(program::options_of(options));
   Records records;
   const run::Simulation simulation =
       run::simulate(request.settings, *request.script, {&records}, [] { return rig::Reason::none; });

@@ -268,6 +268,32 @@ class Page(ReportTest):
         self.assertIn('zeta_N', why(), "the controller's own signals")
         self.assertIn('rotate', self.value('document.getElementById("wheel-upper").getAttribute("transform")'))
 
+    def test_why_names_what_the_gate_did(self):
+        self.lab()
+        from_standstill = {'gate.overspeed_rad_s': 100, 'gate.fault_brake_duty': 0.5, 'gate.brake_rate_per_s': 5}
+        self.open('#' + '&&'.join([words_of(**{'gate.brake_rate_per_s': 40}), words_of(**from_standstill).replace('=170', '=0'),
+                                   words_of(**{'gate.motor_duty_max': 0.4}).replace('=170', '=0')]))
+        actions, *runs = self.value('''window.lab.then(({engine: {tables}, state}) => [tables.gate_actions,
+            ...state.results.map(({gate, summary}) => [[...gate], summary.gate])])''')
+        for gate, counted in runs:
+            self.assertEqual({name: sum(cycle >> bit & 1 for cycle in gate) for bit, name in enumerate(actions)}, counted)
+        page = (self.folder / 'lab.html').read_text()
+        self.assertEqual([action for action in actions if f'\n  {action}: (' not in page], [], 'actions without words')
+        self.value('document.getElementById("whole").click()')
+        for run, action, wanted in ((0, 'passed', 'passed'), (0, 'brake_rate_limited', 'held the rise of the brake duty to 40 /s'),
+                                    (1, 'refused', r'.* -> fault: wheel speed above the limit.*'),
+                                    (1, 'brake_rate_limited', r'.*above the limit.*; held the rise of the brake duty to 5 /s'),
+                                    (2, 'motor_clamped', r'kept the motor duty between 0 and 0\.4'),
+                                    (2, 'refused', r'.*phase exceeded its time limit.*')):
+            self.value(f'document.querySelectorAll(".tab")[{run}].click()')
+            row = next(row for row, cycle in enumerate(runs[run][0]) if cycle >> actions.index(action) & 1)
+            said = self.value(f'''(() => {{ const slider = document.getElementById("moment");
+                slider.value = +slider.min + {row} * slider.step; slider.dispatchEvent(new Event("input"));
+                return [...document.querySelectorAll("#why tr")].find(({{children}}) => children[0].textContent === "gate")
+                    .children[{run + 1}].textContent; }})()''')
+            self.assertRegex(said, f'^{wanted}$', (run, action, row))
+        self.assertEqual(self.browser.said, [])
+
     def test_the_wheels_turn_and_stop(self):
         self.lab()
         self.open()

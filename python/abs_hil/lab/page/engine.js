@@ -39,7 +39,8 @@ class Engine {
     for (const { name, unit, own, address: at } of answer.columns) {
       columns.set(name, { unit, own, values: new Float64Array(this.exports.memory.buffer, at, answer.rows).slice() });
     }
-    return { ...answer, columns, values: flat(answer.config) };
+    const gate = new Uint16Array(this.exports.memory.buffer, answer.gate, answer.rows).slice();
+    return { ...answer, columns, gate, values: flat(answer.config) };
   }
 
   // The run's rows as `abs_hil --csv` writes them.

@@ -177,6 +177,26 @@ function phaseOf(run, row) {
   return phase && phase.kind === PHASES[kind] && phase.name ? phase.name : PHASES[kind];
 }
 
+// What the command gate did, in words; `most` gives the value of an option.
+const GATE = {
+  passed: () => 'passed',
+  motor_clamped: (most) => `kept the motor duty between 0 and ${most('motor_duty_max')}`,
+  brake_clamped: (most) => `kept the brake duty between 0 and ${most('brake_duty_max')}`,
+  motor_blocked_by_brake: () => 'motor off, the brake goes first',
+  motor_blocked_by_disable: () => 'motor off, it was not enabled',
+  refused: (most, fault) => fault?.message ?? 'sent the safe command',
+  motor_rate_limited: (most) => `held the rise of the motor duty to ${most('motor_rate_per_s')} /s`,
+  brake_rate_limited: (most) => `held the rise of the brake duty to ${most('brake_rate_per_s')} /s`,
+  motor_blocked_by_phase: () => 'motor off in this phase',
+  brake_blocked_by_phase: () => 'brake off in this phase' };
+
+// The gate may find a fault after the sequence: its event is in the next cycle then.
+function gateOf(actions, run, row, fault, hidden) {
+  const most = (key) => (`gate.${key}` in hidden.set ? 'its limit' : short(run.values.get(`gate.${key}`)));
+  return actions.filter((_, bit) => (run.gate[row] >> bit) & 1)
+    .map((action) => GATE[action](most, fault ?? run.events.find(({ kind }) => kind === 'fault'))).join('; ');
+}
+
 let PHASES = [];
 function drawWhy(place, tables, runs, time, hidden) {
   PHASES = tables.phases;
@@ -191,9 +211,9 @@ function drawWhy(place, tables, runs, time, hidden) {
       const event = latest(run, n, 'phase');
       return event ? `${event.message.replace(/^.*: /, '')}, ${short(event.time_s - braked(run))} s` : '–';
     })),
-    line('gate', '', runs.map((run, n) => latest(run, n, 'fault')?.message ?? 'no fault'))];
+    line('gate', '', runs.map((run, n) => gateOf(tables.gate_actions, run, rows[n], latest(run, n, 'fault'), hidden)))];
   for (const [name, title] of TOLD) {
-    if (hidden.includes(name)) continue;
+    if (hidden.columns.includes(name)) continue;
     lines.push(line(title, runs[0].columns.get(name).unit, runs.map((run, n) => short(at(run, n, name)))));
   }
   const own = new Set(runs.flatMap(({ columns }) => [...columns].filter(([, column]) => column.own).map(([name]) => name)));

@@ -116,7 +116,7 @@ async function lab() {
     state.time = time;
     at('moment').value = time;
     at('moment').setAttribute('aria-valuetext', `${short(time)} s`);
-    drawWhy(at('why'), engine.tables, state.results, time, hidden.columns);
+    drawWhy(at('why'), engine.tables, state.results, time, hidden);
     wheels.show(time);
     if (mark) figures.mark(time);
   }
