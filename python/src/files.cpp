@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abs_hil/event_t.hpp"
@@ -142,8 +143,8 @@ py::dict read_log_facts(const std::string& path) {
   }
   py::dict facts;
   facts["start_us"] = start_us;
-  facts["cycles"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(cycles.size()), cycles.data());
-  facts["sequences"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(sequences.size()), sequences.data());
+  facts["cycles"] = array_of(std::move(cycles));
+  facts["sequences"] = array_of(std::move(sequences));
   facts["events"] = told;
   return facts;
 }

@@ -137,6 +137,7 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
     std::vector<std::string> unusable(typed.size());
     study::for_each_index(typed.size(), threads, [&](std::size_t i) {
       if (!in_python[i]) unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
+      loop.after(0, jobs.size());
     });
     std::atomic<std::size_t> finished{0};
     std::vector<std::size_t> usable;
@@ -199,6 +200,7 @@ py::list simulate_series(const py::dict& arguments) {
   const std::vector<config::SeriesMember> members = config::members_of(*base.script, base.settings.seed);
   std::vector<program::RunRequest> requests;
   for (const config::SeriesMember& member : members) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     requests.push_back(program::merge(program::options_of(common, member)));
     if (!base.script->series.experiments.empty()) program::refuse_nested(*base.script, *requests.back().script);
   }

@@ -241,6 +241,32 @@ def test_a_signal_ends_many_slow_runs_at_once(threads):
     assert late_s < 2.0  # 0.06 s on an idle computer; a part of the batch takes ten
 
 
+@pytest.mark.skipif(not hasattr(signal, 'SIGALRM'), reason='Windows has no alarm')
+def test_a_signal_ends_the_reading_of_many_options_at_once(monkeypatch):
+    """Before the first run each of them is checked, which takes seconds."""
+    due_s = 0.0
+
+    def armed(*arguments):
+        nonlocal due_s
+        due_s = time.monotonic() + 0.2
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        return simulate_many(*arguments)
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+    simulate_many = abs_hil.core._core.simulate_many
+    monkeypatch.setattr(abs_hil.core._core, 'simulate_many', armed)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            abs_hil.simulate_many({'plant.theta_N': np.linspace(15.0, 30.0, 30000)}, threads=1)
+        late_s = time.monotonic() - due_s
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert late_s < 2.0  # as above; all of them take ten
+
+
 def test_lists():
     assert 'adaptive' in abs_hil.controllers() and 'python' not in abs_hil.controllers()
     assert set(abs_hil.plants()) >= {'paper-table1', 'paper-timing', 'inteco-manual'}
