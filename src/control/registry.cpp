@@ -133,8 +133,9 @@ std::unique_ptr<SlipController> make_controller(std::string_view name, const Con
     for (const ControllerFiles& files : file_table()) {
       if (rig::FileEndings{{files.ending}}.fit(name)) return files.make(std::string(name), context);
     }
-    throw std::invalid_argument("controller " + std::string(name) +
-                                ": this program takes no controllers from files; abs_hil does");
+    throw std::invalid_argument(
+        "controller " + std::string(name) +
+        ": this program takes no controllers from files and no classes in Python; abs_hil does");
   }
   const auto entry = std::ranges::find(table(), name, &ControllerEntry::name);
   if (entry == table().end()) throw std::invalid_argument(unknown_name_message(name));

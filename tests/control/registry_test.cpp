@@ -42,7 +42,9 @@ TEST_CASE("An unknown name is answered with the nearest and all known ones") {
   CHECK_THROWS_WITH(control::make_controller("loked", {options, parameters}), Contains("did you mean 'locked'"));
   CHECK_THROWS_AS(control::make_controller("", {options, parameters}), std::invalid_argument);
   CHECK_THROWS_WITH(control::make_controller("my_law:Law", {options, parameters}),
-                    Contains("my_law:Law") && Contains("abs_hil.simulate_many") && !Contains("did you mean"));
+                    Contains("my_law:Law") && Contains("no classes in Python") && !Contains("did you mean"));
+  CHECK_THROWS_WITH(control::make_controller("my-law:Law", {options, parameters}),
+                    Contains("my-law:Law") && Contains("give a class in Python as MODULE:CLASS"));
 }
 
 TEST_CASE("A registered controller stands beside ours; a taken or empty name is refused") {
