@@ -54,6 +54,7 @@ prepare() {
   fi
   # The message types, the tables, the FMUs' library for Windows: the same in every wheel.
   scripts/build.sh release --target abs_hil_python abs_hil_fmu
+  scripts/lab.sh  # the WebAssembly of `abs_hil lab`, the same in every wheel as well
 }
 
 # python_of PLATFORM PYTHON: the folder of that platform's Python, unpacked
