@@ -127,7 +127,7 @@ def test_a_gymnasium_that_is_too_old_is_named_with_what_to_install(monkeypatch):
 def test_an_option_that_no_environment_has_is_refused():
     vectors = gymnasium.make_vec(ID, num_envs=2, vectorization_mode='vector_entry_point', **QUICK)
     for environment in (gymnasium.make(ID, **QUICK), vectors):
-        with pytest.raises(ValueError, match="'plant.theta_N' is none of this environment; give index"):
+        with pytest.raises(ValueError, match="has no option 'plant.theta_N'; its options: index"):
             environment.reset(options={'plant.theta_N': 30})
 
 

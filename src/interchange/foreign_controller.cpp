@@ -46,40 +46,38 @@ std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
   return fmu;
 }
 
-abs_hil_input foreign_input(const control::SlipInput& in, double time_s) noexcept {
-  return {.time_s = time_s,
-          .dt_s = in.dt_s,
-          .omega1_rad_s = in.speeds.omega1_rad_s,
-          .omega2_rad_s = in.speeds.omega2_rad_s,
-          .slip = in.slip,
-          .slip_ref = in.slip_ref,
-          .mean_brake_torque_Nm = in.mean_brake_torque_Nm,
-          .brake_torque_Nm = in.brake_torque_Nm,
-          .max_brake_torque_Nm = in.max_brake_torque_Nm,
-          .alpha1_rad_s2 = in.alpha1_rad_s2,
-          .alpha2_rad_s2 = in.alpha2_rad_s2,
-          .upper_travel_rad = in.upper_travel_rad,
-          .lower_travel_rad = in.lower_travel_rad,
-          .sent_brake_torque_Nm = in.sent_brake_torque_Nm,
-          .unsent_torque_Nm = in.unsent_torque_Nm};
+/// Calls `take(foreign, own)` for each quantity that both inputs have.
+template <class Foreign, class Own, class Take>
+void for_each_input(Foreign& foreign, Own& own, const Take& take) noexcept {
+  take(foreign.dt_s, own.dt_s);
+  take(foreign.omega1_rad_s, own.speeds.omega1_rad_s);
+  take(foreign.omega2_rad_s, own.speeds.omega2_rad_s);
+  take(foreign.slip, own.slip);
+  take(foreign.slip_ref, own.slip_ref);
+  take(foreign.mean_brake_torque_Nm, own.mean_brake_torque_Nm);
+  take(foreign.brake_torque_Nm, own.brake_torque_Nm);
+  take(foreign.max_brake_torque_Nm, own.max_brake_torque_Nm);
+  take(foreign.alpha1_rad_s2, own.alpha1_rad_s2);
+  take(foreign.alpha2_rad_s2, own.alpha2_rad_s2);
+  take(foreign.upper_travel_rad, own.upper_travel_rad);
+  take(foreign.lower_travel_rad, own.lower_travel_rad);
+  take(foreign.sent_brake_torque_Nm, own.sent_brake_torque_Nm);
+  take(foreign.unsent_torque_Nm, own.unsent_torque_Nm);
+}
+
+abs_hil_input foreign_input(const control::SlipInput& own, double time_s) noexcept {
+  abs_hil_input foreign{};
+  foreign.time_s = time_s;
+  for_each_input(foreign, own, [](double& to, double from) { to = from; });
+  return foreign;
 }
 
 }  // namespace
 
-control::SlipInput slip_input(const abs_hil_input& in) noexcept {
-  return {.dt_s = in.dt_s,
-          .speeds = {in.omega1_rad_s, in.omega2_rad_s},
-          .slip = in.slip,
-          .slip_ref = in.slip_ref,
-          .mean_brake_torque_Nm = in.mean_brake_torque_Nm,
-          .brake_torque_Nm = in.brake_torque_Nm,
-          .max_brake_torque_Nm = in.max_brake_torque_Nm,
-          .alpha1_rad_s2 = in.alpha1_rad_s2,
-          .alpha2_rad_s2 = in.alpha2_rad_s2,
-          .upper_travel_rad = in.upper_travel_rad,
-          .lower_travel_rad = in.lower_travel_rad,
-          .sent_brake_torque_Nm = in.sent_brake_torque_Nm,
-          .unsent_torque_Nm = in.unsent_torque_Nm};
+control::SlipInput slip_input(const abs_hil_input& foreign) noexcept {
+  control::SlipInput own{};
+  for_each_input(foreign, own, [](double from, double& to) { to = from; });
+  return own;
 }
 
 abs_hil_output foreign_output(const control::SlipOutput& out) noexcept {

@@ -60,7 +60,7 @@ class ForeignController final : public control::SlipController {
 };
 
 /// What a law is told and answers, in the terms of the C interface.
-[[nodiscard]] control::SlipInput slip_input(const abs_hil_input& in) noexcept;
+[[nodiscard]] control::SlipInput slip_input(const abs_hil_input& foreign) noexcept;
 [[nodiscard]] abs_hil_output foreign_output(const control::SlipOutput& out) noexcept;
 
 /// What makes controllers from files (docs/interchange.md). Their code runs in a process of its own until `set_home`

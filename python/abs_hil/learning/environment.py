@@ -33,8 +33,8 @@ def check_options(options: Mapping[str, Any] | None, *known: str) -> None:
     """Raises ValueError for an option of `reset` that the environment does not have."""
     for name in options or ():
         if name not in known:
-            raise ValueError(f'options: {name!r} is none of this environment; give {" or ".join(known) or "none"}. Values of the '
-                             'configuration stand in gymnasium.make(..., set={...})')
+            raise ValueError(f'options: this environment has no option {name!r}; its options: {", ".join(known) or "none"}. '
+                             'Configuration values go into gymnasium.make(..., set={...})')
 
 
 class SlipControl(gymnasium.Env):
