@@ -11,10 +11,16 @@ cd "$(dirname "$(realpath "$0")")/.."
 slow_labels='^(slow|vm|bench|docs|on-demand)$'
 preset=${1:-release}
 [ $# -gt 0 ] && shift
+set_up() {
+  for list in packages.txt packages-analysis.txt packages-tests.txt; do scripts/setup.sh "$list"; done
+  # The report's page needs plotly. The first of the README's commands installs it too, but nobody has to run that before.
+  scripts/setup_python.sh python-packages.txt || echo "test: no plotly from PyPI, see above: tests of the report will fail" >&2
+}
+
 if [ "$preset" = quick ]; then
   echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs," \
     "reports, network, virtual machine, long simulations (scripts/test.sh runs these too)"
-  for list in packages.txt packages-analysis.txt packages-tests.txt; do scripts/setup.sh "$list"; done
+  set_up
   scripts/build.sh release --target abs_hil_quick_tests
   ctest --preset release -j "$(nproc)" -LE "$slow_labels" "$@"
   exit
@@ -29,9 +35,7 @@ fi
 echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
   "(packages-spy.txt), mesaflash (packages-mesa.txt), the firmware (packages-firmware.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
   "network namespaces"
-for list in packages.txt packages-analysis.txt packages-tests.txt; do scripts/setup.sh "$list"; done
-# The report's page needs plotly. The first of the README's commands installs it too, but nobody has to run that before.
-scripts/setup_python.sh python-packages.txt || echo "test: no plotly from PyPI, see above: tests of the report will fail" >&2
+set_up
 # Without these packages the tests in a virtual machine are skipped, unless they must not be.
 scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQUIRE_VM:-}" != 1 ]; }
 if [ "${CI:-}" = true ]; then
