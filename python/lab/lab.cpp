@@ -76,7 +76,7 @@ Json tables() {
   Json all{{"keys", keys()}};
   for (const control::ControllerEntry& entry : control::controllers()) {
     all["controllers"].push_back(
-        {{"name", entry.name}, {"meaning", entry.summary}, {"section", config::section_of(entry.name)}});
+        {{"name", entry.name}, {"meaning", entry.summary}, {"section", control::section_of(entry.name)}});
   }
   for (const config::PlantEntry& plant : config::known_plants()) {
     all["plants"].push_back({{"name", plant.name}, {"meaning", plant.description}});

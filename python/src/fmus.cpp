@@ -34,13 +34,14 @@ void fill(fmu::ControllerModel& model, const config::Settings& s) {
   model.sensors.speeds_given = s.plant.ideal_sensors;
 }
 
-py::dict described(const fmu::Variable& variable) {
+py::dict described(const fmu::Variable& variable, bool tunable) {
   constexpr std::array types{"real", "integer", "", "boolean", "string"};  // of rig::OptionTarget
   constexpr std::array causalities{"parameter", "input", "output"};
   py::dict row;
   row["name"] = variable.name;
   row["type"] = types.at(variable.value.index());
   row["causality"] = causalities.at(static_cast<std::size_t>(variable.causality));
+  row["tunable"] = tunable;
   row["unit"] = std::string(variable.facts.unit);
   row["meaning"] = std::string(variable.facts.meaning);
   row["allowed"] = variable.facts.allowed.list();
@@ -56,7 +57,9 @@ py::dict model_of(const config::Settings& s, std::string_view kind, const std::s
   fill(model, s);
   model.start(0.0);  // refuses what cannot work
   py::list variables;
-  for (const fmu::Variable& variable : model.variables()) variables.append(described(variable));
+  for (const fmu::Variable& variable : model.variables()) {
+    variables.append(described(variable, model.tunable(variable)));
+  }
   py::dict facts;
   facts["name"] = fmt::format("abs_hil {} {}", kind, name);
   facts["token"] = fmu::token_of(kind, model);

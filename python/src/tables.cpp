@@ -102,7 +102,7 @@ void add_tables(py::module_& module) {
   module.def("experiments", &experiments);
   module.def("figures", &figures);
   module.def("keys", &keys, py::arg("options"));
-  module.def("section_of", [](const std::string& controller) { return config::section_of(controller); });
+  module.def("section_of", [](const std::string& controller) { return control::section_of(controller); });
   module.def("max_brake_torque_Nm", &max_brake_torque_Nm, py::arg("options"));
 }
 

@@ -23,6 +23,26 @@ def test_gymnasiums_checker():
     check_env(environment.unwrapped, skip_render_check=True)
 
 
+def test_the_picture_shows_the_episode():
+    environment = gymnasium.make(ID, render_mode='rgb_array', **QUICK)
+    check_env(environment.unwrapped)
+    plain = gymnasium.make(ID, **QUICK).unwrapped
+
+    def picture(actions):
+        environment.reset(seed=1)
+        for action in actions:
+            environment.step(np.array([action], dtype=np.float32))
+        return environment.render()
+    first = picture([0.5] * 20)
+    assert first.shape == (480, 640, 3) and first.dtype == np.uint8
+    np.testing.assert_array_equal(first, picture([0.5] * 20))
+    np.testing.assert_array_equal(first, copy.deepcopy(environment.unwrapped).render())
+    assert not np.array_equal(first, picture([0.5] * 10 + [0.6] * 10))
+    assert plain.render() is None
+    with pytest.raises(ValueError, match="render_mode 'human'"):
+        type(plain)(render_mode='human')
+
+
 def test_the_same_seed_gives_the_same_episode():
     def episode(seed):
         environment = gymnasium.make(ID, **QUICK)

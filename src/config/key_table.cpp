@@ -156,12 +156,6 @@ std::string number_text(const Settings& settings, std::string_view name) {
   return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key->target);
 }
 
-std::string section_of(std::string_view controller) {
-  std::string name(controller);
-  std::replace(name.begin(), name.end(), '-', '_');
-  return "control." + name + '.';
-}
-
 Value parse_value(const Key& key, std::string_view text) {
   return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(text);
 }

@@ -48,9 +48,6 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// The number that the settings have for this key, as text; empty for any other text. Not real-time safe.
 [[nodiscard]] std::string number_text(const Settings& settings, std::string_view name);
 
-/// The prefix of a controller's own keys: "control.sliding_mode.".
-[[nodiscard]] std::string section_of(std::string_view controller);
-
 /// All configuration values by their dotted names. The table is made from the rows of the options.
 /// A value `model.x` that nobody sets follows `plant.x`, in whatever order the values are set.
 class KeyTable {

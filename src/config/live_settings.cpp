@@ -15,29 +15,20 @@ namespace {
 
 constexpr std::string_view slip_ref_key = "control.slip_ref";
 
-bool may_change(const Key& key, const std::string& controller) {
-  if (key.name == slip_ref_key) return true;
-  if (key.start_value) return false;
-  // The laws (16) and (17) share these two gains.
-  if (controller == "nominal" && (key.name == "control.adaptive.ks0" || key.name == "control.adaptive.ks1"))
-    return true;
-  return key.name.starts_with(section_of(controller));
-}
-
 }  // namespace
 
 std::string LiveSettings::resolve(std::string_view name) const {
   Settings copy = settings_;
   const KeyTable keys(copy);
   const std::string& controller = settings_.control.controller;
-  for (const std::string& prefix : {std::string(), std::string("control."), section_of(controller)}) {
+  for (const std::string& prefix : {std::string(), std::string("control."), control::section_of(controller)}) {
     std::string key = prefix + std::string(name);
     const auto is_named = [&key](const Key& known) { return known.name == key; };
     const auto known = std::find_if(keys.keys().begin(), keys.keys().end(), is_named);
     if (known == keys.keys().end()) continue;
-    if (may_change(*known, controller)) return key;
+    if (control::changes_in_a_run(key, *known, controller)) return key;
     throw ConfigError(fmt::format("{} cannot be changed while controller {} runs; change control.slip_ref or {}*", key,
-                                  controller, section_of(controller)));
+                                  controller, control::section_of(controller)));
   }
   throw ConfigError(fmt::format("unknown key {} (abs_hil list --keys shows all)", name));
 }

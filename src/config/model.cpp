@@ -7,6 +7,7 @@
 #include <string_view>
 #include <variant>
 
+#include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "config/key_table.hpp"
@@ -118,7 +119,7 @@ std::vector<std::string> negative_at_dead_zone(const Settings& s) {
 std::vector<std::string> theta_out_of_bounds(const Settings& settings) {
   Settings copy = settings;
   const KeyTable table(copy);
-  const std::string section = section_of(settings.control.controller);
+  const std::string section = control::section_of(settings.control.controller);
   const Key* least = find_key(table.keys(), section + "theta_min_N");
   const Key* most = find_key(table.keys(), section + "theta_max_N");
   std::vector<std::string> problems;

@@ -142,4 +142,18 @@ std::unique_ptr<SlipController> make_controller(std::string_view name, const Con
   return entry->make(context);
 }
 
+std::string section_of(std::string_view controller) {
+  std::string name(controller);
+  std::ranges::replace(name, '-', '_');
+  return "control." + name + '.';
+}
+
+bool changes_in_a_run(std::string_view key, const rig::OptionFacts& facts, std::string_view controller) {
+  if (key == "control.slip_ref") return true;
+  if (facts.start_value) return false;
+  // The laws (16) and (17) share these two gains.
+  if (controller == "nominal" && (key == "control.adaptive.ks0" || key == "control.adaptive.ks1")) return true;
+  return key.starts_with(section_of(controller));
+}
+
 }  // namespace abs_hil::control

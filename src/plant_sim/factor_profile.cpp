@@ -162,12 +162,12 @@ void FactorProgress::settle_on_changes(double angle2_rad) noexcept {
 
 PresentFactor FactorProgress::present_of_changes(double angle2_rad) const noexcept {
   const FactorProfile::Piece& p = piece();
-  PresentFactor now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.highest()};
+  PresentFactor now{.value = scale_ * p.value, .angle2_rad = angle2_rad, .highest = scale_ * p.highest()};
   if (!counting_) return now;
   if (p.slope != 0.0) {
     const double position = along_time() ? time_s_ - origin_time_s_ : r2_m_ * (angle2_rad - origin_angle2_rad_);
-    now.value = p.at(std::clamp(position, p.begin, p.end));
-    (along_time() ? now.per_s : now.per_rad) = along_time() ? p.slope : p.slope * r2_m_;
+    now.value = scale_ * p.at(std::clamp(position, p.begin, p.end));
+    (along_time() ? now.per_s : now.per_rad) = scale_ * (along_time() ? p.slope : p.slope * r2_m_);
   }
   if (!along_time()) now.end_angle2_rad = end_angle2_rad();
   return now;

@@ -34,7 +34,7 @@ void check_key(std::string_view entry, std::string_view key) {
 
 /// The key's full name: as it is, with "control.", or with the controller's own section.
 std::string full_name(const config::KeyTable& keys, std::string_view key, const std::string& controller) {
-  for (const std::string& prefix : {std::string(), std::string("control."), config::section_of(controller)}) {
+  for (const std::string& prefix : {std::string(), std::string("control."), control::section_of(controller)}) {
     const std::string name = prefix + std::string(key);
     if (config::find_key(keys.keys(), name) != nullptr) return name;
   }

@@ -162,6 +162,86 @@ class FmuTest(ProgramTest):
             for one in (*whole, *branch):
                 one.close()
 
+    def test_road_friction_is_the_plants_friction_profile(self):
+        for fmi in (2, 3):
+            path = self.export('plant', *START, fmi=fmi)
+            by_profile = Instance(self.export('road', *START, '--set', 'plant.friction_profile=time: 1; 0.4 at 0.1', fmi=fmi))
+            by_input, even = Instance(path), Instance(path)
+            rows = []
+            for n in range(200):
+                by_input.set('road_friction', 0.4 if n >= 100 else 1.0)
+                row = []
+                for instance in (by_profile, by_input, even):
+                    instance.set('brake_duty', 0.6)
+                    instance.step(n * 1e-3, 1e-3)
+                    row.append([instance.get(name) for name in ('omega1_rad_s', 'omega2_rad_s', 'theta_N')])
+                rows.append(row)
+            for n, (profile, given, _) in enumerate(rows):  # the profile's jump is within rounding of a step's end
+                for expected, found in zip(profile[:2] if n == 99 else profile, given):
+                    self.assertAlmostEqual(expected, found, delta=1e-9, msg=n)
+            self.assertEqual([row[1] for row in rows[:100]], [row[2] for row in rows[:100]])
+            self.assertNotEqual(rows[-1][1], rows[-1][2])
+            with self.assertRaises(FMICallException):
+                by_input.set('road_friction', 1.5)
+                by_input.step(0.2, 1e-3)
+            for instance in (by_profile, by_input, even):
+                instance.close()
+
+    def braking(self, pair, first, last, tune=()):
+        """Torques asked for and slips of steps first to last - 1; `tune` is set before the first."""
+        plant, law = pair
+        for name, value in tune:
+            law.set(name, value)
+        torques, slips = [], []
+        for n in range(first, last):
+            for name in ('upper_counts', 'lower_counts'):
+                law.set(name, plant.get(name))
+            law.step(n * 1e-3, 1e-3)
+            plant.set('brake_duty', law.get('brake_duty'))
+            plant.step(n * 1e-3, 1e-3)
+            torques.append(law.get('brake_torque_ref_Nm'))
+            slips.append(law.get('slip_est'))
+        return torques, slips
+
+    def test_gains_are_tuned_between_steps(self):
+        tuned = (('control.adaptive.ks1', 30.0), ('control.slip_ref', 0.3))
+        for fmi in (2, 3):
+            with self.subTest(fmi=fmi):
+                described = {v.name: v.variability for v in fmpy.read_model_description(
+                    self.export('law', '--controller', 'adaptive', fmi=fmi)).modelVariables}
+                self.assertEqual({name for name, kind in described.items() if kind == 'tunable' and '.adaptive.' not in name},
+                                 {'control.slip_ref'})
+                self.assertEqual(described['control.adaptive.ks0'], 'tunable')
+                self.assertEqual(described['control.adaptive.zeta0'], 'fixed', 'a start value')
+                # Before the first step: as if exported so.
+                exported = self.pair(fmi, *(word for name, value in tuned for word in ('--set', f'{name}={value}')))
+                self.assertEqual(self.braking(self.pair(fmi), 0, 50, tuned), self.braking(exported, 0, 50))
+                # Later: without a jump, and the slip goes to its new reference.
+                pair, same = self.pair(fmi), self.pair(fmi)
+                before, slips = self.braking(pair, 0, 300)
+                self.assertEqual((before, slips), self.braking(same, 0, 300))
+                after, slips = self.braking(pair, 300, 700, tuned)
+                untouched, kept = self.braking(same, 300, 700)
+                self.assertLess(max(abs(a - b) for a, b in zip(after[:1], untouched[:1])), 0.05 * max(before))
+                self.assertAlmostEqual(sum(kept[-100:]) / 100, 0.15, delta=0.03)
+                self.assertAlmostEqual(sum(slips[-100:]) / 100, 0.3, delta=0.03)
+                law = pair[1]
+                for name, value in (('control.rate_Hz', 500.0), ('control.pi.kp_per_s', 1.0), ('control.adaptive.zeta0', 1.0)):
+                    with self.assertRaises(FMICallException, msg=name):
+                        law.set(name, value)
+
+    def test_a_kept_state_knows_what_waits_to_be_tuned(self):
+        pair = self.pair(2)
+        self.braking(pair, 0, 200)
+        for name, value in (('control.adaptive.ks1', 30.0), ('control.slip_ref', 0.3)):
+            pair[1].set(name, value)
+        self.braking(pair, 200, 201)  # the gains act now, the reference one step later
+        kept = [one.fmu.getFMUstate() for one in pair]
+        expected = self.braking(pair, 201, 300)
+        for one, state in zip(pair, kept):
+            one.fmu.setFMUstate(state)
+        self.assertEqual(self.braking(pair, 201, 300), expected)
+
     def test_several_instances(self):
         path = self.export('plant', *START)
         instances = [Instance(path, f'rig {n}', plant__theta_N=15.0 + n) for n in range(3)]

@@ -73,4 +73,11 @@ void register_controller_files(const ControllerFiles& files);
 /// run.
 [[nodiscard]] std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context);
 
+/// Part of the keys' names that holds the options of a controller, such as "control.sliding_mode.".
+[[nodiscard]] std::string section_of(std::string_view controller);
+
+/// True if the option `key` may change while the controller runs: the slip reference, and the controller's gains but
+/// for the start values of its estimates.
+[[nodiscard]] bool changes_in_a_run(std::string_view key, const rig::OptionFacts& facts, std::string_view controller);
+
 }  // namespace abs_hil::control

@@ -70,12 +70,17 @@ class FactorProgress {
   }
   /// True if the factor never changes.
   [[nodiscard]] bool steady() const noexcept { return !changes_; }
-  void exchange_state(rig::StateBytes& state) { state(index_, time_s_, origin_time_s_, origin_angle2_rad_, counting_); }
+  /// Scales the whole profile from now on, by a factor > 0. `start` leaves it.
+  void scale(double factor) noexcept { scale_ = factor; }
+  void exchange_state(rig::StateBytes& state) {
+    state(index_, time_s_, origin_time_s_, origin_angle2_rad_, counting_, scale_);
+  }
   /// False if the factor is always 1.
   [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
   [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {
     if (changes_) return present_of_changes(angle2_rad);
-    return {.value = constant_, .angle2_rad = angle2_rad, .highest = constant_};
+    const double value = scale_ * constant_;
+    return {.value = value, .angle2_rad = angle2_rad, .highest = value};
   }
 
  private:
@@ -94,6 +99,7 @@ class FactorProgress {
   double origin_time_s_{0.0};
   double origin_angle2_rad_{0.0};
   bool counting_{true};  ///< the origin has been passed
+  double scale_{1.0};
 };
 
 /// Factors of the drifting parameters at one instant.

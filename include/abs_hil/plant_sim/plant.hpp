@@ -65,13 +65,16 @@ class Plant {
   /// All of the state, the profiles' places and the brake's path included.
   void exchange_state(rig::StateBytes& state);
 
+  /// Scales the road's friction from now on, on top of its profile: (0, 1], as the models were checked for 1.
+  void scale_friction(double factor) noexcept { profile_.scale(factor); }
+
   /// Lifts the upper wheel off the lower one, which takes the tyre force away, or lowers it again.
   void part_wheels(bool apart) noexcept { model_.part(apart); }
 
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] double slip() const noexcept;
   [[nodiscard]] double tyre_force_N() const noexcept;
-  /// Present value of the friction profile: friction of the road relative to the tyre model.
+  /// Present value of the scaled friction profile: friction of the road relative to the tyre model.
   [[nodiscard]] double friction() const noexcept;
   /// `theta_N` is the largest braking force that any slip could give now (WheelModel::peak_force_N).
   [[nodiscard]] rig::PlantTruth truth() const noexcept;

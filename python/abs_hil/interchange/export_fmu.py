@@ -77,7 +77,8 @@ def _add_variables(root: Element, variables: list[dict[str, Any]], fmi: int) -> 
         parameter = v['causality'] == 'parameter'
         node = _add(rows, tag if fmi == 3 else 'ScalarVariable', name=v['name'], valueReference=reference, description=meaning,
                     causality=v['causality'],
-                    variability='fixed' if parameter else 'continuous' if v['type'] == 'real' else 'discrete')
+                    variability='tunable' if v['tunable'] else 'fixed' if parameter else
+                    'continuous' if v['type'] == 'real' else 'discrete')
         if fmi == 2 and v['causality'] == 'output':
             node.set('initial', 'calculated')
         _add_type(node if fmi == 3 else _add(node, tag), v, fmi)

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector.utils import batch_space
 
 from ..missing import how_to_install
+from .picture import MODES, EpisodePicture
 from .rigs import HIGH, LOW, TRAINING_SEED, Rigs, Task
 
 try:
@@ -58,15 +59,19 @@ class SlipControl(gymnasium.Env):
 
     Every episode has another plant: see abs_hil.learning.Task (plant, set, vary, randomise, period_s, start_speed_rad_s),
     whose fields are this environment's arguments. The same seed of `reset` gives the same plants.
+
+    render_mode "rgb_array": render() returns the episode so far as a picture, uint8 of shape (480, 640, 3).
     """
 
-    metadata: dict[str, Any] = {'render_modes': []}
+    metadata: dict[str, Any] = {'render_modes': list(MODES), 'render_fps': 100}
 
     def __init__(self, plants_seed: int = TRAINING_SEED, render_mode: str | None = None, **task: Any) -> None:
         self.render_mode = render_mode
         self.observation_space = observation_space()
         self.action_space = action_space()
         self._rigs = Rigs(1, Task(**task), seed=plants_seed)
+        self._picture = EpisodePicture(render_mode, self._rigs.task.period_s)
+        self.metadata = {**self.metadata, 'render_fps': round(1.0 / self._rigs.task.period_s)}
         self._steps = 0
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -75,13 +80,19 @@ class SlipControl(gymnasium.Env):
         super().reset(seed=seed)
         index = int(options['index']) if options else int(self.np_random.integers(2**31))
         self._steps = 0
-        return self._rigs.reset(0, index), {'index': index}
+        observation = self._rigs.reset(0, index)
+        self._picture.begin(observation)
+        return observation, {'index': index}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         observations, rewards, ended = self._rigs.step(np.asarray(action))
         self._steps += 1
+        self._picture.add(observations[0])
         return (observations[0], float(rewards[0]), bool(ended[0]), not ended[0] and self._steps >= MOST_STEPS,
                 {'true_slip': float(self._rigs.true_slip[0])})
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        return self._picture.draw()
 
 
 class SlipControlVector(VectorEnv):

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..options import Value, program, text_of
 from .environment import action_space, check_options, observation_space
+from .picture import MODES, EpisodePicture
 from .rigs import CHANGE_PRICE, END_SPEED_M_S, FAULT_REWARD, HIGH, LOW
 
 #: AgentPage of src/interchange/agent_controller.hpp
@@ -40,6 +41,7 @@ class RigSlipControl(gymnasium.Env):
     an action comes; info["late_cycles"] counts such cycles. Terminated: the run has ended, below 3 m/s or by a fault;
     info["result"] and info["reason"] say how, as in summary.json. Truncated: the program lives on after `longest_s` of braking.
 
+    render_mode: as of SlipControl.
     backend:   "rig" or "sim"; the simulator runs in real time, too.
     set:       configuration values by dotted key, as {"driver.kind": "hm2"}. A real board takes an agent only with
                "unsafe.foreign_controller": True, and what it asks for beside that (docs/rig-setup.md).
@@ -47,7 +49,7 @@ class RigSlipControl(gymnasium.Env):
     Raises RuntimeError, with the program's words, if a run cannot begin.
     """
 
-    metadata: dict[str, Any] = {'render_modes': []}
+    metadata: dict[str, Any] = {'render_modes': list(MODES), 'render_fps': 100}
 
     def __init__(self, backend: str = 'rig', *, set: Mapping[str, Value] | None = None, arguments: Sequence[str] = (),
                  period_s: float = 0.01, hold_s: float = 0.03, run_up_s: float = 120.0, longest_s: float = 60.0,
@@ -55,6 +57,7 @@ class RigSlipControl(gymnasium.Env):
         if not 0.0 < period_s <= hold_s <= 1.0:
             raise ValueError(f'period_s {period_s}, hold_s {hold_s}: give 0 < period_s <= hold_s <= 1')
         self.render_mode = render_mode
+        self._picture = EpisodePicture(render_mode, period_s)
         self.observation_space, self.action_space = observation_space(), action_space()
         self._period_s, self._hold_s, self._run_up_s, self._longest_s = period_s, hold_s, run_up_s, longest_s
         self._own = tempfile.TemporaryDirectory(prefix='abs_hil_agent_')
@@ -95,7 +98,9 @@ class RigSlipControl(gymnasium.Env):
                 self._end()
                 raise RuntimeError(f'no braking within {self._run_up_s:g} s: raise run_up_s, or see why the rig does not run up')
             time.sleep(LOOK_S)
-        return self._observe(self._values()), {}
+        observation = self._observe(self._values())
+        self._picture.begin(observation)
+        return observation, {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         asked = float(np.clip(np.asarray(action, dtype=np.float64).reshape(-1)[0], 0.0, 1.0))
@@ -116,7 +121,12 @@ class RigSlipControl(gymnasium.Env):
             if info['result'] != 'completed':
                 reward = FAULT_REWARD
             self._process = None
-        return self._observe(values), reward, ended, not ended and values['time_s'] > self._longest_s, info
+        observation = self._observe(values)
+        self._picture.add(observation)
+        return observation, reward, ended, not ended and values['time_s'] > self._longest_s, info
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        return self._picture.draw()
 
     def close(self) -> None:
         """Ends a run as Ctrl-C does: the outputs go to zero."""

@@ -40,6 +40,7 @@ class SimDriver final : public RigDriver {
     return grid_.as_sent(command);
   }
   void note_wheels_apart(bool apart) noexcept override { plant_.part_wheels(apart); }
+  void scale_friction(double factor) noexcept { plant_.scale_friction(factor); }
   /// For tests: the command that acts on the simulated rig.
   [[nodiscard]] const plant_sim::PlantInput& outputs() const noexcept { return input_; }
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }

@@ -80,11 +80,14 @@ const Variable& Component::variable(std::uint32_t reference) const {
   return model_->variables()[reference - 1];
 }
 
-const Variable& Component::to_set(std::uint32_t reference) const {
+const Variable& Component::to_set(std::uint32_t reference) {
   const Variable& found = variable(reference);
   if (found.causality == Causality::output) throw std::invalid_argument(found.name + " is an output; it cannot be set");
   if (found.causality == Causality::parameter && started_) {
-    throw std::invalid_argument(found.name + " is a fixed parameter; set it before the initialisation ends");
+    if (!model_->tunable(found)) {
+      throw std::invalid_argument(found.name + " is a fixed parameter; set it before the initialisation ends");
+    }
+    model_->tuned(found);
   }
   return found;
 }
@@ -107,7 +110,7 @@ void Component::step(double time_s, double duration_s) {
                                 std::to_string(time_s_) + " s");
   }
   for (const Variable& variable : model_->variables()) {
-    if (variable.causality == Causality::input) check(variable);
+    if (variable.causality == Causality::input || model_->tunable(variable)) check(variable);
   }
   model_->step(duration_s);
   time_s_ += duration_s;

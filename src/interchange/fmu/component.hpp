@@ -30,8 +30,9 @@ class Component {
   Component(std::string name, const std::string& token, const std::string& resources, Logger logger);
 
   [[nodiscard]] const Variable& variable(std::uint32_t reference) const;
-  /// The variable, whose value is about to be set. Throws for an output, and for a parameter after the start.
-  [[nodiscard]] const Variable& to_set(std::uint32_t reference) const;
+  /// The variable, whose value is about to be set. Throws for an output, and after the start for a parameter that is
+  /// not tunable.
+  [[nodiscard]] const Variable& to_set(std::uint32_t reference);
   void set_start_time(double time_s) noexcept { start_s_ = time_s; }
   /// End of initialisation: the model begins.
   void start();

@@ -5,12 +5,15 @@
 #include <limits>
 #include <stdexcept>
 
+#include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/pwm.hpp"
 
 namespace abs_hil::interchange::fmu {
 
 namespace {
+
+constexpr std::string_view slip_ref_key = "control.slip_ref";
 
 /// Longest braking that a plan allows, s.
 constexpr double longest_s = 600.0;
@@ -64,9 +67,40 @@ void ControllerModel::start(double time_s) {
   parts.duty_steps = grid_.any_brake_duty ? 0 : grid_.duty_steps;
   logic_ = std::make_unique<experiment::RunLogic>(std::move(parts));
   latch_ = {};
+  slip_ref_tuned_ = gains_tuned_ = false;
   start_s_ = time_s_ = time_s;
   brake_torque_ref_Nm_ = brake_duty_ = estimated_torque_Nm_ = slip_est_ = theta_est_N_ = 0.0;
   omega1_est_rad_s_ = omega2_est_rad_s_ = experiment.start_speed_rad_s;
+}
+
+bool ControllerModel::tunable(const Variable& parameter) const {
+  return parameter.causality == Causality::parameter && std::holds_alternative<double*>(parameter.value) &&
+         control::changes_in_a_run(parameter.name, parameter.facts, control.controller);
+}
+
+void ControllerModel::tuned(const Variable& parameter) {
+  (parameter.name == slip_ref_key ? slip_ref_tuned_ : gains_tuned_) = true;
+}
+
+/// What was tuned since the last step, as `abs_hil send slip_ref` and `send gain` do it: without a bump, the slip
+/// reference one step after the gains.
+void ControllerModel::tune() {
+  if (time_s_ == start_s_) {
+    start(start_s_);
+  } else if (gains_tuned_) {
+    auto law = control::make_controller(control.controller, {control, model});
+    if (!law->take_over(logic_->controller())) {
+      throw std::invalid_argument("the gains of controller " + control.controller +
+                                  " cannot be changed while it runs; change " + std::string(slip_ref_key) + " only");
+    }
+    static_cast<void>(
+        logic_->adjustments().put({.kind = experiment::Adjustment::Kind::controller, .controller = std::move(law)}));
+    gains_tuned_ = false;
+  } else {
+    static_cast<void>(
+        logic_->adjustments().put({.kind = experiment::Adjustment::Kind::slip_ref, .slip_ref = control.slip_ref}));
+    slip_ref_tuned_ = false;
+  }
 }
 
 void ControllerModel::step(double duration_s) {
@@ -80,6 +114,7 @@ void ControllerModel::step(double duration_s) {
                                 std::to_string(period_s) + " s (its control.rate_Hz), at most of " +
                                 std::to_string(std::max(longest_period_s, period_s)) + " s");
   }
+  if (gains_tuned_ || slip_ref_tuned_) tune();
   const std::int64_t now_ns = std::llround((time_s_ - start_s_) * static_cast<double>(rig::ns_per_s));
   rig::CycleRecord record{.stamp_ns = now_ns};
   rig::Measurement measurement{.time_ns = now_ns, .upper_counts = upper_counts_, .lower_counts = lower_counts_};
@@ -103,7 +138,7 @@ void ControllerModel::step(double duration_s) {
 
 void ControllerModel::exchange_state(rig::StateBytes& state) {
   logic_->exchange_state(state);
-  state(latch_, start_s_, time_s_);
+  state(latch_, start_s_, time_s_, slip_ref_tuned_, gains_tuned_);
   state(brake_torque_ref_Nm_, brake_duty_, omega1_est_rad_s_, omega2_est_rad_s_, slip_est_, theta_est_N_,
         estimated_torque_Nm_);
 }

@@ -27,6 +27,8 @@ class ControllerModel final : public Model {
   ControllerModel();
   void start(double time_s) override;
   void step(double duration_s) override;
+  [[nodiscard]] bool tunable(const Variable& parameter) const override;
+  void tuned(const Variable& parameter) override;
   void exchange_state(rig::StateBytes& state) override;
 
   control::ControlOptions control{};
@@ -36,7 +38,11 @@ class ControllerModel final : public Model {
   ControllerSensors sensors{};
 
  private:
+  void tune();
+
   std::unique_ptr<experiment::RunLogic> logic_{};
+  bool slip_ref_tuned_{false};  ///< since the last step
+  bool gains_tuned_{false};
   runtime::RunLatch latch_{};
   driver::OutputGrid grid_{};
   double start_s_{0.0};

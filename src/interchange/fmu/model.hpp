@@ -36,6 +36,10 @@ class Model {
   virtual void start(double time_s) = 0;
   /// Goes on by `duration_s` > 0 under the present inputs. Throws std::invalid_argument for a bad input or duration.
   virtual void step(double duration_s) = 0;
+  /// True for a parameter that may change between steps too.
+  [[nodiscard]] virtual bool tunable(const Variable& /*parameter*/) const { return false; }
+  /// Called after the start when such a parameter is set, before the next step.
+  virtual void tuned(const Variable& /*parameter*/) {}
   /// All that `start` and `step` have made, but not the variables. Between `start` and the end.
   virtual void exchange_state(rig::StateBytes& state) = 0;
 

@@ -22,6 +22,10 @@ PlantModel::PlantModel() {
        .meaning = "brake torque asked for; acts instead of brake_duty if plant.ideal_actuator",
        .range = rig::from_zero(1000)},
       &brake_torque_ref_Nm_);
+  add(Causality::input, "road_friction",
+      {.meaning = "friction of the road: a factor on the plant's tyre force and its friction_profile",
+       .range = rig::between(0.001, 1)},
+      &road_friction_);
   add(Causality::output, "upper_counts", {.meaning = "encoder counter of the upper, braked wheel; wraps at 32 bit"},
       &upper_counts_);
   add(Causality::output, "lower_counts", {.meaning = "encoder counter of the lower wheel, the road; wraps at 32 bit"},
@@ -67,6 +71,7 @@ void PlantModel::read() {
 }
 
 void PlantModel::step(double duration_s) {
+  driver_->scale_friction(road_friction_);
   rig::Command sent;
   const driver::IoResult written = driver_->write({.motor_duty = motor_duty_,
                                                    .brake_duty = brake_duty_,

@@ -40,6 +40,7 @@ class PlantModel final : public Model {
   double brake_duty_{0.0};
   double brake_torque_ref_Nm_{0.0};
   bool motor_enable_{true};
+  double road_friction_{1.0};
   std::int32_t upper_counts_{0};
   std::int32_t lower_counts_{0};
   double omega1_rad_s_{0.0};

@@ -44,7 +44,7 @@ void get_values(const Component& component, const Reference* references, std::si
 
 /// A value that the variable's row refuses is not taken.
 template <class Value, class Reference, class In>
-void set_values(const Component& component, const Reference* references, std::size_t count, const In* values) {
+void set_values(Component& component, const Reference* references, std::size_t count, const In* values) {
   for (std::size_t n = 0; n < count; ++n) {
     const Variable& variable = component.to_set(static_cast<std::uint32_t>(references[n]));
     Value& value = value_of<Value>(variable);
