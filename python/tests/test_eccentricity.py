@@ -10,6 +10,8 @@ from abs_hil import eccentricity
 FLAWS = {'plant.upper_encoder_eccentricity_rad': 0.01, 'plant.upper_encoder_phase_rad': 1.0,
          'plant.lower_encoder_eccentricity_rad': 0.006, 'plant.lower_encoder_phase_rad': -2.0}
 UNKNOWN = {'model.upper_encoder_eccentricity_rad': 0.0, 'model.lower_encoder_eccentricity_rad': 0.0}
+NOT_LEARNT = {**UNKNOWN, 'control.observer.learn_eccentricity_s': 0.0}
+PLANTS = ('paper-table1', 'paper-timing', 'inteco-manual')
 
 
 def braking(controller='adaptive-peak', **changes):
@@ -37,7 +39,7 @@ def test_fit_finds_what_the_encoder_has(tmp_path):
 
 def test_program_writes_keys_that_the_program_reads(tmp_path, capsys):
     run = tmp_path / 'run.csv'
-    given = braking(**UNKNOWN)
+    given = braking(**NOT_LEARNT)
     given.data.to_csv(run, index=False, na_rep='NaN')
     out = tmp_path / 'model.toml'
     assert eccentricity.main([str(run), '--out', str(out)]) == 0
@@ -50,8 +52,7 @@ def test_program_writes_keys_that_the_program_reads(tmp_path, capsys):
 
 
 def test_learning_while_coasting_does_as_well_as_knowing():
-    unknown, known = braking(**UNKNOWN), braking()
-    learnt = braking(**UNKNOWN, **{'control.observer.learn_eccentricity_s': 0.4})
+    unknown, known, learnt = braking(**NOT_LEARNT), braking(), braking(**UNKNOWN)
     without = abs_hil.simulate('adaptive-peak', experiment='coast-and-brake', set={key: 0.0 for key in FLAWS})
     for wheel in (1, 2):
         assert speed_error(unknown, wheel) > 2.0 * speed_error(known, wheel)
@@ -61,6 +62,39 @@ def test_learning_while_coasting_does_as_well_as_knowing():
     assert distance['unknown'] > 1.05 * distance['without']
     assert distance['known'] == pytest.approx(distance['without'], rel=0.03)
     assert distance['learnt'] == pytest.approx(distance['without'], rel=0.03)
+
+
+def distances(start_rad_s, e_rad, **values):
+    """Of adaptive-optimal at default settings, over three plants and several places of the discs."""
+    places = ((1.0, -2.0), (-2.5, 0.5), (2.5, 2.0), (-1.5, 1.5))
+    runs = [{'controller': 'adaptive-optimal', 'plant': plant, 'set': {
+        'experiment.start_speed_rad_s': start_rad_s, **UNKNOWN, **values,
+        'plant.upper_encoder_eccentricity_rad': e_rad, 'plant.upper_encoder_phase_rad': upper,
+        'plant.lower_encoder_eccentricity_rad': e_rad, 'plant.lower_encoder_phase_rad': lower}}
+        for plant in PLANTS for upper, lower in places]
+    results = abs_hil.simulate_many(runs)
+    assert set(results['fault']) == {''}
+    return np.asarray(results['stop_distance_m'])
+
+
+def test_discs_of_3_mrad_cost_little_by_default():
+    """After a run-up, in which they are learnt, and from a start speed, where nothing can be learnt before braking."""
+    for start_rad_s, most in ((0.0, 0.005), (170.0, 0.03)):
+        excess = distances(start_rad_s, 0.003) / distances(start_rad_s, 0.0) - 1.0
+        assert excess.mean() < most, start_rad_s
+    ignored = distances(170.0, 0.003, **{'control.observer.unlearnt_eccentricity_rad': 0.0}) / distances(170.0, 0.0) - 1.0
+    assert ignored.mean() > 0.2, 'the case is none'
+
+
+def test_learning_leaves_sound_discs_alone_and_says_what_it_found():
+    sound = abs_hil.simulate('adaptive-optimal')
+    assert sound.summary['encoder_eccentricity_rad'] == {'upper': 0.0, 'lower': 0.0}
+    off = abs_hil.simulate('adaptive-optimal', set=NOT_LEARNT)
+    assert off.summary['encoder_eccentricity_rad'] == {'upper': None, 'lower': None}
+    for name in ('omega1_est_rad_s', 'brake_torque_ref_Nm', 'slip'):
+        np.testing.assert_array_equal(sound[name], off[name])
+    found = abs_hil.simulate('adaptive', set={**FLAWS, **UNKNOWN}).summary['encoder_eccentricity_rad']
+    assert found == {'upper': pytest.approx(0.01, rel=0.02), 'lower': pytest.approx(0.006, rel=0.02)}
 
 
 def test_a_wheel_that_hardly_turns_is_refused():

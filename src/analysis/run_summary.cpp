@@ -100,6 +100,8 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
   json["csv_rows_lost"] = s.csv_rows_lost;
   json["gate"] = to_json(s.gate);
   json["checks_unjudged"] = number_or_null(s.checks_unjudged);
+  json["encoder_eccentricity_rad"] = {{"upper", number_or_null(s.upper_eccentricity_rad)},
+                                      {"lower", number_or_null(s.lower_eccentricity_rad)}};
   json["config"] = s.config;
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
   if (!s.foreign_controller.is_null()) json["foreign_controller"] = s.foreign_controller;
@@ -150,6 +152,11 @@ std::string to_text(const RunSummary& s) {
   if (s.checks_unjudged > 0.0) {
     line("checks of the wheels",
          fmt::format("a verdict was due and not possible yet for {:.3g} % of the time", 100.0 * s.checks_unjudged));
+  }
+  if (s.upper_eccentricity_rad > 0.0 || s.lower_eccentricity_rad > 0.0) {
+    line("encoder discs", fmt::format("off their centres, upper {} and lower {}: learnt before braking, and corrected",
+                                      shown(1e3 * s.upper_eccentricity_rad, 2, "mrad"),
+                                      shown(1e3 * s.lower_eccentricity_rad, 2, "mrad")));
   }
   if (s.virtual_time) {
     line("timing", "virtual time (--fast): no latencies to report");

@@ -30,6 +30,8 @@ struct RunSummary {
   rig::TimingSummary timing{};
   rig::GateCounts gate{};       ///< numbers of the command gate's interventions
   double checks_unjudged{0.0};  ///< share of the run's time in which the gate's checks could not judge the wheels
+  double upper_eccentricity_rad{rig::unknown};  ///< of the encoders' discs, as learnt; NaN: nothing was learnt
+  double lower_eccentricity_rad{rig::unknown};
   nlohmann::ordered_json config{};
   nlohmann::ordered_json friction_curve{};  ///< result of the experiment's analysis; null without one
   std::string model{};                      ///< name of the controllers' model; empty: the plant

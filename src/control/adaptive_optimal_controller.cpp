@@ -25,6 +25,8 @@ constexpr double known_spread = 0.15;
 constexpr double unknown_spread = 0.4;
 // The curve is learnt about this often, however short the cycles are: more readings of the same counts say no more.
 constexpr double learning_rate_Hz = 1000.0;
+/// Part of a swing once a turn that the observer's force shows.
+constexpr double quick_passes = 0.5;
 
 const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
   rig::require_valid(o, "control.adaptive_optimal.");
@@ -77,7 +79,8 @@ void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
                             rig_.wheels.d1_Nms_rad * input.speeds.omega1_rad_s + rig_.wheels.M10_Nm;
   bank_.reset({.slip = slip_of(input.speeds),
                .car_speed_m_s = std::max(rig_.wheels.r2_m * input.speeds.omega2_rad_s, v_min_m_s_),
-               .force_N = (turning_Nm + input.brake_torque_Nm) / rig_.wheels.r1_m});
+               .force_N = (turning_Nm + input.brake_torque_Nm) / rig_.wheels.r1_m,
+               .swing_m_s = swing(input.disc_error_rad, input.speeds.omega2_rad_s).speed_m_s});
   speeds_.reset(input.speeds);
   reference_ = options_.slip_start;
   model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
@@ -87,6 +90,18 @@ void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
 
 double AdaptiveOptimalController::slip_of(const rig::WheelSpeeds& speeds) const noexcept {
   return rig::wheel_slip(rig_.wheels.r1_m * speeds.omega1_rad_s, rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
+}
+
+/// An angle that swings by e once a turn looks like an acceleration that swings by e omega^2. The lags of the force
+/// pass less of it.
+FrictionBank::Swing AdaptiveOptimalController::swing(double disc_error_rad, double omega_rad_s) const noexcept {
+  if (!(disc_error_rad > 0.0)) return {};
+  const double force_N = rig_.wheels.J2_kg_m2 * disc_error_rad * omega_rad_s * omega_rad_s / rig_.wheels.r2_m;
+  const double ratio = omega_rad_s / options_.bank.force_bandwidth_rad_s;
+  const double one_lag = 1.0 / std::sqrt(1.0 + ratio * ratio);
+  return {.force_N = force_N * one_lag * one_lag * one_lag,
+          .quick_force_N = quick_passes * force_N,
+          .speed_m_s = rig_.wheels.r2_m * disc_error_rad * omega_rad_s};
 }
 
 void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexcept {
@@ -111,6 +126,7 @@ void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexc
                .force_N = force_.force_N(),
                .covered = force_.covered(),
                .quick_force_N = observer_.force_N(),
+               .swing = swing(input.disc_error_rad, omega2_est),
                .runaway_per_N = rig_.wheels.r1_m / (loop_.mass_kg_m * v_x * rig_.brake.c31_per_s)});
   // The balance of both wheels, against that of the curve at the same slip.
   const paper::Reading<double> same{.omega1 = 0.0, .omega2 = 0.0, .lambda_ref = 0.0, .phi = 1.0};

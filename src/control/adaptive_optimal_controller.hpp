@@ -65,6 +65,7 @@ class AdaptiveOptimalController final : public SlipController {
 
   [[nodiscard]] double slip_of(const rig::WheelSpeeds& speeds) const noexcept;
   void learn(const SlipInput& input, double slip) noexcept;
+  [[nodiscard]] FrictionBank::Swing swing(double disc_error_rad, double omega_rad_s) const noexcept;
   [[nodiscard]] double peak_factor() const noexcept;
   [[nodiscard]] double near_gain_per_s() const noexcept;
   [[nodiscard]] double next_reference(double dt_s) noexcept;

@@ -12,6 +12,9 @@ namespace {
 
 /// Fewer turns in a block do not part the eccentricity from the cubic.
 constexpr double least_turns = 3.0;
+/// Root mean square of what a fit may leave, counts. Counting leaves 0.29, unequal slots and a dirty place more.
+constexpr double most_left_counts = 1.0;
+constexpr double least_eccentricity_counts = 0.25;
 
 [[nodiscard]] std::int32_t within_turn(std::int64_t counts, std::int32_t counts_per_rev) noexcept {
   const auto rest = static_cast<std::int32_t>(counts % counts_per_rev);
@@ -59,6 +62,7 @@ void EccentricityFit::begin(std::int64_t time_ns, std::int32_t counts) noexcept 
   start_ns_ = time_ns;
   start_counts_ = latest_counts_ = counts;
   travel_ = 0;
+  squares_rad2_ = 0.0;
   normal_ = {};
 }
 
@@ -78,6 +82,7 @@ auto EccentricityFit::take(std::int64_t time_ns, std::int32_t counts) noexcept
   for (std::size_t i = 0; i < unknowns; ++i) {
     for (std::size_t j = i; j < columns; ++j) normal_[i][j] += row[i] * row[j];
   }
+  squares_rad2_ += row[unknowns] * row[unknowns];
   ++samples_;
   if (passed_s < block_s_) return std::nullopt;
   const bool often_enough = std::abs(static_cast<double>(travel_)) >= least_turns * counts_per_rev_;
@@ -97,9 +102,15 @@ auto EccentricityFit::solved() noexcept -> std::optional<rig::EccentricityParame
       for (std::size_t j = i; j <= unknowns; ++j) normal_[i][j] -= part * normal_[k][j];
     }
   }
+  const double rad_per_count = rig::radians_per_count(counts_per_rev_);
+  double left_rad2 = squares_rad2_;
+  for (std::size_t k = 0; k < unknowns; ++k) left_rad2 -= normal_[k][unknowns] * normal_[k][unknowns] / normal_[k][k];
+  const double most_left_rad = most_left_counts * rad_per_count;
+  if (!(left_rad2 <= most_left_rad * most_left_rad * static_cast<double>(samples_))) return std::nullopt;
   const double sine = normal_[5][6] / normal_[5][5];
   const double cosine = (normal_[4][6] - normal_[4][5] * sine) / normal_[4][4];
   // A cos + B sin = e sin(angle + phase).
+  if (std::hypot(cosine, sine) < least_eccentricity_counts * rad_per_count) return rig::EccentricityParameters{};
   return rig::EccentricityParameters{.eccentricity_rad = std::hypot(cosine, sine),
                                      .phase_rad = std::atan2(cosine, sine)};
 }

@@ -47,9 +47,11 @@ class EncoderDisc {
   double error_counts_{0.0};  ///< of the latest reading
 };
 
-/// Fits a disc's eccentricity to the readings of a wheel that coasts: angle over time is a cubic, and the reading
-/// differs from it by A cos + B sin of itself. Least squares over blocks of a fixed time, each with its own result; the
-/// cubic follows bearing friction over a second to far below a count. Real-time safe: a fixed number of operations.
+/// Fits a disc's eccentricity to the readings of a wheel that turns without brake: angle over time is a cubic, and the
+/// reading differs from it by A cos + B sin of itself. Least squares over blocks of a fixed time, each with its own
+/// result; the cubic follows bearing friction and a steady motor over a second to far below a count. A block that it
+/// does not follow, as when the motor's torque jumps, has none. Less than a quarter of a count, which the fit cannot
+/// tell from what counting leaves and which no law minds, is found as 0. Real-time safe: a fixed number of operations.
 class EccentricityFit {
  public:
   /// @param block_s  length of a block, > 0
@@ -73,6 +75,7 @@ class EccentricityFit {
   std::int32_t latest_counts_{0};
   std::int64_t travel_{0};  ///< since the block's start
   std::int64_t samples_{0};
+  double squares_rad2_{0.0};                                         ///< sum over the block of the angle's square
   std::array<std::array<double, unknowns + 1>, unknowns> normal_{};  ///< equations, with their right-hand side
 };
 

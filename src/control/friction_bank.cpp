@@ -128,8 +128,8 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
 
 void FrictionBank::reset(const Start& start) noexcept {
   const double zero = std::clamp(-start.slip, -zero_max, zero_max);
-  const double spread =
-      options_.zero_error_m_s / start.car_speed_m_s + options_.zero_error_per_N * std::abs(start.force_N);
+  const double spread = std::hypot(options_.zero_error_m_s, start.swing_m_s) / start.car_speed_m_s +
+                        options_.zero_error_per_N * std::abs(start.force_N);
   for (Members& m : bank_) {
     m.theta_N = options_.level0_N;
     m.zero = zero;
@@ -168,21 +168,24 @@ void FrictionBank::learn(const Data& data) noexcept {
   const bool learns = !jumping();
   const double starting = time_s_ < options_.start_s ? 1e6 : 1.0;
   const double timing = options_.timing_error_s * slip_rate_per_s;
-  const double speed = options_.slip_noise_m_s / std::max(data.car_speed_m_s, slip_speed_min_m_s);
-  const Look look{.slip = data.slip,
-                  .late_slip = data.late_slip,
-                  .covered = data.covered,
-                  .slip_offset = late_reading - data.late_slip,
-                  .force_N = data.force_N,
-                  .noise_N2 = starting * rate_Hz_ *
-                              (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N)),
-                  .slip_error2 = error_lasts_s * rate_Hz_ * (square(timing) + square(speed)),
-                  .theta_growth = data.dt_s * (options_.level_drift_per_s + options_.level_drift_unexplained_per_s *
-                                                                                square(unexplained_N_ / peak_force_N_)),
-                  .zero_growth = options_.zero_drift_per_s * data.dt_s,
-                  .back = options_.share_per_s * data.dt_s,
-                  .learns = learns,
-                  .compares = learns && data.car_speed_m_s > learning_m_s};
+  const double speed = std::sqrt(square(options_.slip_noise_m_s) + square(data.swing.speed_m_s)) /
+                       std::max(data.car_speed_m_s, slip_speed_min_m_s);
+  const Look look{
+      .slip = data.slip,
+      .late_slip = data.late_slip,
+      .covered = data.covered,
+      .slip_offset = late_reading - data.late_slip,
+      .force_N = data.force_N,
+      .noise_N2 = starting * rate_Hz_ *
+                  (options_.force_noise_N2_s +
+                   error_lasts_s * (square(options_.force_error * data.force_N) + 0.5 * square(data.swing.force_N))),
+      .slip_error2 = error_lasts_s * rate_Hz_ * (square(timing) + square(speed)),
+      .theta_growth = data.dt_s * (options_.level_drift_per_s +
+                                   options_.level_drift_unexplained_per_s * square(unexplained_N_ / peak_force_N_)),
+      .zero_growth = options_.zero_drift_per_s * data.dt_s,
+      .back = options_.share_per_s * data.dt_s,
+      .learns = learns,
+      .compares = learns && data.car_speed_m_s > learning_m_s};
   for (std::size_t i = 0; i < rows; ++i) learn(shapes_[i / rows_a_shape], look, bank_[i]);
   summarise(data.runaway_per_N);
   late_force_N_ += -rig::exponential_less_one(-data.dt_s / quick_delay_s_) * (force_N_ - late_force_N_);
@@ -238,7 +241,9 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
     }
   }
   const bool watches = time_s_ > options_.jump_after_s && data.car_speed_m_s > learning_m_s;
-  const bool unexplained = std::abs(residual) > std::max(options_.jump_least_N, options_.jump_share * peak_force_N_);
+  const bool unexplained =
+      std::abs(residual) >
+      data.swing.quick_force_N + std::max(options_.jump_least_N, options_.jump_share * peak_force_N_);
   unexplained_s_ = watches && unexplained ? unexplained_s_ + data.dt_s : 0.0;
   const double newest = data.dt_s / (unexplained_lasts_s + data.dt_s);
   unexplained_N_ = watches ? unexplained_N_ + newest * (residual - unexplained_N_) : 0.0;

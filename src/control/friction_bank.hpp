@@ -8,8 +8,9 @@
 //   curve        phi(s) = sin(C atan(B s)),  B = tan(pi / (2 C)) / L,  F(l) = theta phi(l + z)
 //   prediction   Ptt += q theta^2,  Pzz += qz                                 variances of theta, N^2, and of z
 //   gradient     g = (H phi - phi' (H l - l'), theta phi'(l' + z))            l': the reading that is as late as F
-//   noise        R = f (N + T (eF F)^2) + (theta phi')^2 f T ((et l.)^2 + (sv / v)^2),  T = 5 ms,  v: car speed;
-//                10^6 f (N + ...) in the first `start_s`
+//   noise        R = f (N + T (eF F)^2 + T A^2 / 2) + (theta phi')^2 f T ((et l.)^2 + (sv^2 + va^2) / v^2),  T = 5 ms,
+//                v: car speed, A, va: swing of force and speed that discs cause; 10^6 f (N + ...) in the first
+//                `start_s`
 //   update       S = g P g' + R,  K = P g' / S,  r = F - theta g_1,  (theta, z) += K r,  P -= K (P g')'
 //   weight       w <- (w + a h w0) exp(-r^2 / (2 S)) / sqrt(S),  then all weights are divided by their sum
 //   force        F(l) = sum w theta phi(l + z),  peak force = sum w theta,  zero = sum w z
@@ -45,6 +46,12 @@ class FrictionBank {
   /// Throws std::invalid_argument for options out of range.
   FrictionBank(const FrictionBankOptions& options, double rate_Hz, double quick_delay_s);
 
+  /// Amplitudes of the once-a-turn errors that encoder discs off their centres may cause; 0: the discs are known.
+  struct Swing {
+    double force_N{0.0};
+    double quick_force_N{0.0};
+    double speed_m_s{0.0};
+  };
   struct Data {
     double dt_s{0.0};  ///< > 0
     double slip{0.0};
@@ -53,6 +60,7 @@ class FrictionBank {
     double force_N{0.0};        ///< of LowerWheelForce
     double covered{0.0};        ///< of LowerWheelForce
     double quick_force_N{0.0};  ///< less exact and less delayed
+    Swing swing{};
     /// The rate at which the slip grows for each newton that the force falls per unit of slip, r1^2 / (J1 v), over the
     /// brake's rate c31; 1/N.
     double runaway_per_N{0.0};
@@ -62,6 +70,7 @@ class FrictionBank {
     double slip{0.0};
     double car_speed_m_s{0.0};  ///< > 0
     double force_N{0.0};        ///< of the tyre
+    double swing_m_s{0.0};      ///< of the difference of both speeds, by their discs
   };
   void reset(const Start& start) noexcept;
   void learn(const Data& data) noexcept;

@@ -19,8 +19,15 @@ constexpr double bump_gone_Nm = 1e-6;
 /// Longest wait for the start command, s.
 constexpr double start_limit_s = 600.0;
 
-/// The slip that the motor or the start leaves fades within this time; no cubic follows that.
-constexpr double coasting_settles_s = 0.05;
+/// The slip that a change of the motor or the start leaves fades within this time; no cubic follows that.
+constexpr double slip_settles_s = 0.05;
+
+/// What the discs' eccentricity may be as a run begins. Where nothing is learnt, the model's holds.
+double unlearnt_rad(const RunLogicParts& parts) noexcept {
+  const control::ObserverOptions& options = parts.control.observer;
+  const bool known = parts.rig.upper_encoder.eccentricity_rad > 0.0 || parts.rig.lower_encoder.eccentricity_rad > 0.0;
+  return known || !(options.learn_eccentricity_s > 0.0) ? 0.0 : options.unlearnt_eccentricity_rad;
+}
 
 struct FastestChange {
   double upper{0.0};
@@ -79,6 +86,7 @@ RunLogic::RunLogic(RunLogicParts parts)
       learns_eccentricity_(parts.control.observer.learn_eccentricity_s > 0.0),
       upper_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
       lower_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
+      disc_error_rad_(unlearnt_rad(parts)),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
       own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)),
       answers_itself_(parts.answers_itself) {}
@@ -86,7 +94,7 @@ RunLogic::RunLogic(RunLogicParts parts)
 void RunLogic::exchange_state(rig::StateBytes& state) {
   if (!controller_->exchange_state(state)) throw std::invalid_argument("this controller cannot give its state");
   sequence_.exchange_state(state);
-  state(upper_, lower_, upper_fit_, lower_fit_, actuator_);
+  state(upper_, lower_, upper_fit_, lower_fit_, learnt_, disc_error_rad_, actuator_);
   state(slip_ref_, speeds_, upper_travel_rad_, lower_travel_rad_, distance_m_, slip_, alpha1_rad_s2_, alpha2_rad_s2_);
   state(asked_Nm_, target_Nm_, sent_Nm_, unsent_Nm_, in_slip_control_, not_given_, refused_output_, bump_Nm_);
   state(start_given_, answered_, end_, stands_still_, wheels_sound_, started_, start_ns_, last_ns_);
@@ -110,6 +118,7 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s, double
   }
   note_travel(measurement, dt_s);
   if (measurement.ideal_speeds) {
+    disc_error_rad_ = 0.0;
     // The mean over the past cycle from true speeds, without the errors of encoders and observer.
     if (started_ && dt_s > 0.0) {
       alpha1_rad_s2_ = (measurement.ideal_speeds->omega1_rad_s - speeds_.omega1_rad_s) / dt_s;
@@ -139,17 +148,24 @@ void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noe
   distance_m_ += wheels_.r2_m * lower_travel_rad_;
 }
 
-/// While the wheels coast, each reading goes into the fit of its disc. What a block of them gives holds from then on.
+/// While the wheels turn without brake, each reading goes into the fit of its disc. What a block of them gives holds
+/// from then on.
 void RunLogic::learn_eccentricity(const rig::Measurement& measurement, const PhasePlan& plan) noexcept {
-  const bool coasts = plan.brake == BrakeAction::released && sequence_.phase_time_s() >= coasting_settles_s &&
-                      !(plan.motor_duty_at(sequence_.phase_time_s()) > 0.0);
-  if (!coasts || !wheels_sound_) {
+  const bool turns_freely = plan.brake == BrakeAction::released && sequence_.phase_time_s() >= slip_settles_s;
+  if (!turns_freely || !wheels_sound_) {
     upper_fit_.restart();
     lower_fit_.restart();
     return;
   }
-  if (const auto found = upper_fit_.take(measurement.time_ns, measurement.upper_counts)) upper_.know(*found);
-  if (const auto found = lower_fit_.take(measurement.time_ns, measurement.lower_counts)) lower_.know(*found);
+  const auto learn = [&measurement](auto& fit, std::int32_t counts, auto& observer, double& learnt_rad) {
+    const auto found = fit.take(measurement.time_ns, counts);
+    if (!found) return;
+    observer.know(*found);
+    learnt_rad = found->eccentricity_rad;
+  };
+  learn(upper_fit_, measurement.upper_counts, upper_, learnt_.upper_rad);
+  learn(lower_fit_, measurement.lower_counts, lower_, learnt_.lower_rad);
+  if (!std::isnan(learnt_.upper_rad) && !std::isnan(learnt_.lower_rad)) disc_error_rad_ = 0.0;
 }
 
 double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept {
@@ -164,6 +180,7 @@ double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state
                            .alpha2_rad_s2 = alpha2_rad_s2_,
                            .upper_travel_rad = upper_travel_rad_,
                            .lower_travel_rad = lower_travel_rad_,
+                           .disc_error_rad = disc_error_rad_,
                            .sent_brake_torque_Nm = begins ? 0.0 : sent_Nm_,
                            .unsent_torque_Nm = begins ? 0.0 : unsent_Nm_};
   if (begins) controller_->reset(input);

@@ -77,6 +77,12 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
   [[nodiscard]] control::SlipController& controller() noexcept { return *controller_; }
+  /// Eccentricity of both encoders' discs as this run has learnt it, 0: sound; NaN where nothing was learnt.
+  struct LearntDiscs {
+    double upper_rad{rig::unknown};
+    double lower_rad{rig::unknown};
+  };
+  [[nodiscard]] const LearntDiscs& learnt_discs() const noexcept { return learnt_; }
   /// Between cycles, without adjustments on their way. Throws std::invalid_argument for a controller that cannot.
   void exchange_state(rig::StateBytes& state);
   /// Changes put here take effect one per cycle, in cycles in which no phase begins. The cycle's record has an
@@ -111,6 +117,8 @@ class RunLogic final : public runtime::CycleLogic {
   const bool learns_eccentricity_;
   control::EccentricityFit upper_fit_;
   control::EccentricityFit lower_fit_;
+  LearntDiscs learnt_{};
+  double disc_error_rad_;  ///< that a disc may have; 0 once both are known
   control::BrakeActuator actuator_;
   rig::WheelSpeeds speeds_{};
   double upper_travel_rad_{0.0};  ///< over the past interval

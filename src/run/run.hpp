@@ -130,6 +130,7 @@ class Run final : private runtime::Outputs {
   [[nodiscard]] const rig::RunNames& names() const noexcept { return names_; }
   [[nodiscard]] driver::RigDriver& driver() noexcept { return driver_; }
   [[nodiscard]] control::SlipController& controller() noexcept { return logic_.controller(); }
+  [[nodiscard]] const experiment::RunLogic& logic() const noexcept { return logic_; }
   /// For one slow thread during the run.
   [[nodiscard]] experiment::AdjustmentMailbox& adjustments() noexcept { return logic_.adjustments(); }
   [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }

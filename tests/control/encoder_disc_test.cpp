@@ -68,6 +68,35 @@ TEST_CASE("The fit finds the eccentricity of a coasting wheel within a tenth of 
              WithinAbs(e * std::sin(phase - turned), 0.1 * rad_per_count));
 }
 
+TEST_CASE("Less than a quarter of a count is none") {
+  const double part = GENERATE(0.0, 0.15, 0.35);
+  control::EccentricityFit fit(0.4, counts_per_rev);
+  std::optional<rig::EccentricityParameters> found;
+  for (int tick = 0; tick <= 400; ++tick) {
+    const auto result =
+        fit.take(tick * std::int64_t{1'000'000}, reading(coasting_rad(tick * 1e-3), {part * rad_per_count, 1.0}));
+    if (result) found = result;
+  }
+  REQUIRE(found);
+  CHECK((found->eccentricity_rad == 0.0) == (part < 0.25));
+}
+
+TEST_CASE("A block in which the torque jumps teaches nothing, a steady motor does") {
+  const double jump_rad_s2 = GENERATE(0.0, 20.0, -100.0);
+  control::EccentricityFit fit(0.4, counts_per_rev);
+  std::optional<rig::EccentricityParameters> found;
+  for (int tick = 0; tick <= 400; ++tick) {
+    const double t = tick * 1e-3;
+    // A motor with back-EMF from 60 rad/s towards 190 rad/s in 4 s, and the jump after half of the block.
+    const double run_up_rad = 190.0 * t - 130.0 * 4.0 * (1.0 - std::exp(-t / 4.0));
+    const double jumped_rad = 0.5 * jump_rad_s2 * std::pow(std::max(0.0, t - 0.2), 2);
+    const auto result = fit.take(tick * std::int64_t{1'000'000}, reading(run_up_rad + jumped_rad, {0.01, 0.4}));
+    if (result) found = result;
+  }
+  REQUIRE(found.has_value() == (jump_rad_s2 == 0.0));
+  if (found) CHECK_THAT(found->eccentricity_rad, WithinAbs(0.01, 0.1 * rad_per_count));
+}
+
 TEST_CASE("A wheel that hardly turns teaches nothing") {
   control::EccentricityFit fit(0.4, counts_per_rev);
   for (int tick = 0; tick <= 2000; ++tick) {

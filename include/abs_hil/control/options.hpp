@@ -271,9 +271,12 @@ struct ObserverOptions {
   ABS_HIL_OPTION(double, standstill_time_s, 0.05, .unit = "s",
                  .meaning = "time without a count after which a wheel stands", .range = rig::between(0.005, 1));
   ABS_HIL_OPTION(
-      double, learn_eccentricity_s, 0.0, .unit = "s",
-      .meaning = "least time of coasting in which the encoders' eccentricity is fitted; 0: the model's holds",
+      double, learn_eccentricity_s, 0.4, .unit = "s",
+      .meaning = "time without brake in which the encoders' eccentricity is fitted anew; 0: the model's holds",
       .range = rig::from_zero(10));
+  ABS_HIL_OPTION(double, unlearnt_eccentricity_rad, 0.003, .unit = "rad",
+                 .meaning = "eccentricity that adaptive-optimal allows for until it is learnt",
+                 .range = rig::from_zero(0.1));
 };
 
 /// Name number `index` of the table of controllers; empty beyond the last.
