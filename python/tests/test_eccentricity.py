@@ -83,7 +83,7 @@ def test_discs_of_3_mrad_cost_little_by_default():
         excess = distances(start_rad_s, 0.003) / distances(start_rad_s, 0.0) - 1.0
         assert excess.mean() < most, start_rad_s
     ignored = distances(170.0, 0.003, **{'control.observer.unlearnt_eccentricity_rad': 0.0}) / distances(170.0, 0.0) - 1.0
-    assert ignored.mean() > 0.2, 'the case is none'
+    assert ignored.mean() > 0.1, 'the case is none'
 
 
 def test_learning_leaves_sound_discs_alone_and_says_what_it_found():

@@ -39,13 +39,16 @@ const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
   return o;
 }
 
-/// The noise of the force and of the first speeds comes from the steps of the counts.
-FrictionBankOptions counted(FrictionBankOptions bank, const rig::RigParameters& rig) noexcept {
+/// Coarser counts make the force, the first speeds and the loop noisier. The powers were chosen with the gains
+/// (docs/theory-beyond.md).
+AdaptiveOptimalOptions counted(AdaptiveOptimalOptions options, const rig::RigParameters& rig) {
   constexpr double usual_counts_per_rev = 4096.0;
   const double coarser = usual_counts_per_rev / rig.encoder_counts_per_rev;
-  bank.force_noise_N2_s *= coarser * coarser;
-  bank.zero_error_m_s *= coarser;
-  return bank;
+  options.bank.force_noise_N2_s *= coarser;
+  options.bank.zero_error_m_s *= coarser;
+  options.bank.jump_least_N *= std::sqrt(std::max(1.0, coarser));
+  options.play_Nm *= std::sqrt(std::max(1.0, coarser));
+  return options;
 }
 
 ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& rig) noexcept {
@@ -60,7 +63,7 @@ ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& 
 }  // namespace
 
 AdaptiveOptimalController::AdaptiveOptimalController(const ControllerContext& context)
-    : options_{checked(context.options.adaptive_optimal)},
+    : options_{counted(checked(context.options.adaptive_optimal), context.rig)},
       rig_{context.rig},
       laws_{paper::laws(context.rig.wheels)},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -70,7 +73,7 @@ AdaptiveOptimalController::AdaptiveOptimalController(const ControllerContext& co
       observer_{options_.observer, context.rig, context.options.rate_Hz},
       force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
       learns_every_{std::max(1, static_cast<int>(std::lround(context.options.rate_Hz / learning_rate_Hz)))},
-      bank_{counted(options_.bank, context.rig), context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
+      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
   observer_.reset(input.speeds);
@@ -175,7 +178,9 @@ AdaptiveOptimalController::Holding AdaptiveOptimalController::holding(double sli
   const double v_x = std::max(rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
   const double bold_Nm = std::sqrt(2.0 * options_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s *
                                    std::max(here_Nm, usual_hold_Nm));
-  const double spread = wanted.N > 0.0 ? wanted.spread_N / wanted.N : unknown_spread;
+  // A spread that moves the torque by less than the play counts as known, however small the force is.
+  const double least_N = options_.play_Nm / (known_spread * rig_.wheels.r1_m);
+  const double spread = wanted.N > 0.0 ? wanted.spread_N / std::max(wanted.N, least_N) : unknown_spread;
   const double unknown = std::clamp((spread - known_spread) / (unknown_spread - known_spread), 0.0, 1.0);
   const double dared_Nm = std::clamp(wanted_Nm, here_Nm + unknown * bold_Nm, here_Nm + bold_Nm);
   return {dared_Nm, dared_Nm};

@@ -178,7 +178,7 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, zero_error_per_N, 0.002, .unit = "1/N",
                  .meaning = "error of the slip at no force for each newton of tyre force that acts then",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, past_peak_cost, 3.0,
+  ABS_HIL_OPTION(double, past_peak_cost, 1.0,
                  .meaning = "what a peak that is passed costs more, times the runaway of the slip behind it",
                  .range = rig::from_zero(1e4));
   ABS_HIL_OPTION(double, level_drift_per_s, 0.005, .unit = "1/s",
@@ -239,21 +239,21 @@ struct AdaptiveOptimalOptions {
   ABS_HIL_OPTION(double, peak_factor, 1.14, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
   ABS_HIL_OPTION(
-      double, runaway, 0.44,
+      double, runaway, 0.7,
       .meaning = "runaway of the slip past the peak, per time constant of the brake, that undoes this factor",
       .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_rate_per_s, 17.8, .unit = "1/s",
+  ABS_HIL_OPTION(double, slip_rate_per_s, 12.0, .unit = "1/s",
                  .meaning = "fastest rise of the logarithm of the slip reference", .range = rig::positive(1000));
   ABS_HIL_OPTION(double, search_part, 0.08, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
   ABS_HIL_OPTION(double, search_rad_s, 28.0, .unit = "rad/s", .meaning = "frequency of the search",
                  .range = rig::positive(1000));
   ABS_HIL_GROUP(FrictionBankOptions, bank, "", {});
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 0.046});
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 5.0});
 };
 
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
