@@ -43,11 +43,15 @@ const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
 /// (docs/theory-beyond.md).
 AdaptiveOptimalOptions counted(AdaptiveOptimalOptions options, const rig::RigParameters& rig) {
   constexpr double usual_counts_per_rev = 4096.0;
+  constexpr double most_search_part = 0.5;
   const double coarser = usual_counts_per_rev / rig.encoder_counts_per_rev;
-  options.bank.force_noise_N2_s *= coarser;
+  options.bank.force_noise_N2_s *= coarser * std::sqrt(std::sqrt(coarser));
   options.bank.zero_error_m_s *= coarser;
-  options.bank.jump_least_N *= std::sqrt(std::max(1.0, coarser));
-  options.play_Nm *= std::sqrt(std::max(1.0, coarser));
+  if (coarser > 1.0) {
+    options.bank.jump_least_N *= std::sqrt(coarser);
+    options.play_Nm *= std::sqrt(coarser);
+    options.search_part = std::min(most_search_part, options.search_part * std::sqrt(coarser));
+  }
   return options;
 }
 
