@@ -98,6 +98,15 @@ def test_nothing_beats_a_bound(monkeypatch):
     assert beaten('locked', even)
 
 
+def test_several_things_wrong_at_once():
+    """Coarse encoders, a brake unlike the model's, ice: once the loop dared full torque in single cycles there, 2,800 N m."""
+    combined = [case for case in cases.whole_set() if case.group == 'combined']
+    score = run(Entry('adaptive-optimal', {}), combined, bounds.stored(), (1, 2, 3)).total
+    assert score.failed == score.locked == 0
+    assert score.variation_worst_Nm <= 400.0
+    assert score.excess_worst <= 0.15 and score.excess_mean <= 0.03
+
+
 def test_the_shipped_gains_are_those_of_the_search():
     """research/search_braking_gains.py --check also computes their scores again."""
     stored = json.loads((pathlib.Path(__file__).parents[2] / 'config/training/gains.json').read_text(encoding='utf-8'))
