@@ -54,13 +54,16 @@ double exposure_s(const config::Settings& s, const std::string& fault) {
     const bool too_long = static_cast<double>(clock.now_ns()) * 1e-9 > longest_s;
     return too_long ? rig::Reason::stop_command : rig::Reason::none;
   }));
+  const bool of_motor = fault.find("motor_pwm") != std::string::npos;
   double begins_s = -1.0;
   double exposed_s = 0.0;
   double before_s = 0.0;
   for (const rig::CycleRecord& r : recorder.records) {
     if (begins_s < 0.0 && r.phase == injection.phase) begins_s = r.time_s + injection.delay_s;
     const bool found = r.phase == rig::Phase::fault;  // gate.fault_brake_duty may brake then
-    const bool acts = !found && (r.command.motor_duty > 0.0 || r.command.brake_duty > 0.0);
+    // A run that is fast enough before the fault brakes by then: a motor that is not driven cannot show that it is off.
+    const bool braked = r.command.brake_duty > 0.0 && !of_motor;
+    const bool acts = !found && (r.command.motor_duty > 0.0 || braked);
     if (begins_s >= 0.0 && r.time_s > begins_s && acts && r.truth.speeds.omega2_rad_s > judged_rad_s)
       exposed_s += r.time_s - before_s;
     before_s = r.time_s;
