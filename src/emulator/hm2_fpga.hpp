@@ -40,8 +40,6 @@ class Hm2Fpga final : public RigBehind {
   [[nodiscard]] bool bitten() const noexcept { return status_ != 0; }
   /// True while any pin is an output.
   [[nodiscard]] bool drives_pins() const noexcept;
-  /// Time of the last reload of the watchdog; -1: none since power-on.
-  [[nodiscard]] std::int64_t last_pet_ns() const noexcept { return last_pet_ns_; }
   [[nodiscard]] OutputLog& log() noexcept { return log_; }
   /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
   [[nodiscard]] std::string registers_text() const;
@@ -102,8 +100,8 @@ class Hm2Fpga final : public RigBehind {
   std::uint32_t watchdog_time_{disabled};
   std::uint32_t status_{1};  ///< a watchdog that was never set has bitten at the first clock
   bool armed_{false};
-  std::int64_t bites_ns_{0};  ///< when the armed watchdog bites
-  std::int64_t last_pet_ns_{-1};
+  std::int64_t bites_ns_{0};      ///< when the armed watchdog bites
+  std::int64_t last_pet_ns_{-1};  ///< last reload of the watchdog; -1: none since power-on
   OutputLog log_{};
 };
 

@@ -21,19 +21,6 @@ template <class S>
   return laws.e_v({.omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip_ref});
 }
 
-/// The part of e_v' in (14) that bearing friction causes, with the sign in which (16) cancels it, m/s^2:
-/// -(r1/J1)(d1 omega1 + M10) + (1 - slip_ref)(r2/J2)(d2 omega2 + M20). Both wheels turn forwards. Real-time safe.
-[[nodiscard]] constexpr double friction_drift_m_s2(const rig::WheelParameters& w, const rig::WheelSpeeds& speeds,
-                                                   double slip_ref) noexcept {
-  return paper::laws(w).delta({.omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip_ref});
-}
-
-/// k(slip_ref) of (15): the effect of a unit of tyre force on the rate of the slip velocity error, 1/kg. Real-time
-/// safe.
-[[nodiscard]] constexpr double slip_velocity_gain(const rig::WheelParameters& w, double slip_ref) noexcept {
-  return paper::laws(w).k({.lambda_ref = slip_ref});
-}
-
 /// A of the error dynamics [I; e_v]' = A [I; e_v] that the control law imposes: e_v'' + ks1 e_v' + ks0 e_v = 0.
 [[nodiscard]] Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1);
 

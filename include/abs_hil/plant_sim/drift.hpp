@@ -68,8 +68,6 @@ class FactorProgress {
   [[nodiscard]] double steady_to_angle2_rad() const noexcept {
     return !changes_ || along_time() ? std::numeric_limits<double>::infinity() : end_angle2_rad();
   }
-  /// True if the factor never changes.
-  [[nodiscard]] bool steady() const noexcept { return !changes_; }
   /// Scales the whole profile from now on, by a factor > 0. `start` leaves it.
   void scale(double factor) noexcept { scale_ = factor; }
   void exchange_state(rig::StateBytes& state) {

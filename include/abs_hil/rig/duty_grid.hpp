@@ -26,11 +26,6 @@ inline constexpr double width_slack = 1e-9;
   return std::min(width, cap);
 }
 
-/// The nearest duty that the PWM gives.
-[[nodiscard]] constexpr double nearest_duty(double duty, std::uint32_t steps) noexcept {
-  return steps == 0 ? duty : duty_of(width_for(steps, duty, 1.0), steps);
-}
-
 /// The largest duty that the PWM gives and that is not above `duty_max`.
 [[nodiscard]] constexpr double duty_at_most(double duty_max, std::uint32_t steps) noexcept {
   return steps == 0 ? duty_max : duty_of(width_for(steps, 1.0, duty_max), steps);
