@@ -11,12 +11,6 @@
 
 namespace abs_hil::config {
 
-namespace {
-
-constexpr std::string_view slip_ref_key = "control.slip_ref";
-
-}  // namespace
-
 std::string LiveSettings::resolve(std::string_view name) const {
   Settings copy = settings_;
   const KeyTable keys(copy);
@@ -37,7 +31,7 @@ experiment::Adjustment LiveSettings::set(const std::string& key, double value) {
   Settings changed = settings_;
   KeyTable(changed).set(key, value, "command");
   experiment::Adjustment adjustment;
-  if (key == slip_ref_key) {
+  if (key == control::slip_ref_key) {
     adjustment.kind = experiment::Adjustment::Kind::slip_ref;
     adjustment.slip_ref = changed.control.slip_ref;
   } else {

@@ -149,7 +149,7 @@ std::string section_of(std::string_view controller) {
 }
 
 bool changes_in_a_run(std::string_view key, const rig::OptionFacts& facts, std::string_view controller) {
-  if (key == "control.slip_ref") return true;
+  if (key == slip_ref_key) return true;
   if (facts.start_value) return false;
   // The laws (16) and (17) share these two gains.
   if (controller == "nominal" && (key == "control.adaptive.ks0" || key == "control.adaptive.ks1")) return true;

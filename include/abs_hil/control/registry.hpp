@@ -76,6 +76,9 @@ void register_controller_files(const ControllerFiles& files);
 /// Part of the keys' names that holds the options of a controller, such as "control.sliding_mode.".
 [[nodiscard]] std::string section_of(std::string_view controller);
 
+/// The key of the slip reference, which may change in every run.
+inline constexpr std::string_view slip_ref_key = "control.slip_ref";
+
 /// True if the option `key` may change while the controller runs: the slip reference, and the controller's gains but
 /// for the start values of its estimates.
 [[nodiscard]] bool changes_in_a_run(std::string_view key, const rig::OptionFacts& facts, std::string_view controller);

@@ -63,7 +63,7 @@ class SlipControl(gymnasium.Env):
     render_mode "rgb_array": render() returns the episode so far as a picture, uint8 of shape (480, 640, 3).
     """
 
-    metadata: dict[str, Any] = {'render_modes': list(MODES), 'render_fps': 100}
+    metadata: dict[str, Any] = {'render_modes': list(MODES)}
 
     def __init__(self, plants_seed: int = TRAINING_SEED, render_mode: str | None = None, **task: Any) -> None:
         self.render_mode = render_mode

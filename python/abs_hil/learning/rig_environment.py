@@ -49,7 +49,7 @@ class RigSlipControl(gymnasium.Env):
     Raises RuntimeError, with the program's words, if a run cannot begin.
     """
 
-    metadata: dict[str, Any] = {'render_modes': list(MODES), 'render_fps': 100}
+    metadata: dict[str, Any] = {'render_modes': list(MODES)}
 
     def __init__(self, backend: str = 'rig', *, set: Mapping[str, Value] | None = None, arguments: Sequence[str] = (),
                  period_s: float = 0.01, hold_s: float = 0.03, run_up_s: float = 120.0, longest_s: float = 60.0,
@@ -58,6 +58,7 @@ class RigSlipControl(gymnasium.Env):
             raise ValueError(f'period_s {period_s}, hold_s {hold_s}: give 0 < period_s <= hold_s <= 1')
         self.render_mode = render_mode
         self._picture = EpisodePicture(render_mode, period_s)
+        self.metadata = {**self.metadata, 'render_fps': round(1.0 / period_s)}
         self.observation_space, self.action_space = observation_space(), action_space()
         self._period_s, self._hold_s, self._run_up_s, self._longest_s = period_s, hold_s, run_up_s, longest_s
         self._own = tempfile.TemporaryDirectory(prefix='abs_hil_agent_')

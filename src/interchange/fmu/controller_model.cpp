@@ -13,8 +13,6 @@ namespace abs_hil::interchange::fmu {
 
 namespace {
 
-constexpr std::string_view slip_ref_key = "control.slip_ref";
-
 /// Longest braking that a plan allows, s.
 constexpr double longest_s = 600.0;
 
@@ -79,7 +77,7 @@ bool ControllerModel::tunable(const Variable& parameter) const {
 }
 
 void ControllerModel::tuned(const Variable& parameter) {
-  (parameter.name == slip_ref_key ? slip_ref_tuned_ : gains_tuned_) = true;
+  (parameter.name == control::slip_ref_key ? slip_ref_tuned_ : gains_tuned_) = true;
 }
 
 /// What was tuned since the last step, as `abs_hil send slip_ref` and `send gain` do it: without a bump, the slip
@@ -91,7 +89,8 @@ void ControllerModel::tune() {
     auto law = control::make_controller(control.controller, {control, model});
     if (!law->take_over(logic_->controller())) {
       throw std::invalid_argument("the gains of controller " + control.controller +
-                                  " cannot be changed while it runs; change " + std::string(slip_ref_key) + " only");
+                                  " cannot be changed while it runs; change " + std::string(control::slip_ref_key) +
+                                  " only");
     }
     static_cast<void>(
         logic_->adjustments().put({.kind = experiment::Adjustment::Kind::controller, .controller = std::move(law)}));

@@ -50,6 +50,7 @@ void PlantModel::start(double time_s) {
   start_s_ = time_s_ = time_s;
   driver_->configure();
   driver_->activate(0);
+  driver_->scale_friction(road_friction_);
   read();
 }
 
