@@ -10,25 +10,21 @@ namespace abs_hil::emulator {
 
 namespace {
 
-struct Kind {
-  std::string_view name;
-  NodeFaultKind kind;
-  unsigned most;  ///< largest number; 0: takes no number
-};
-constexpr std::array<Kind, 14> node_faults{{{"ok", NodeFaultKind::ok, 0},
-                                            {"silent", NodeFaultKind::silent, 0},
-                                            {"deaf", NodeFaultKind::deaf, 0},
-                                            {"drop", NodeFaultKind::drop, 100'000},
-                                            {"no-status", NodeFaultKind::no_status, 0},
-                                            {"stale", NodeFaultKind::stale, 127},
-                                            {"ahead", NodeFaultKind::ahead, 127},
-                                            {"stuck", NodeFaultKind::stuck, 0},
-                                            {"duplicate", NodeFaultKind::duplicate, 0},
-                                            {"swapped", NodeFaultKind::swapped, 0},
-                                            {"wrong-size", NodeFaultKind::wrong_size, 8},
-                                            {"corrupt", NodeFaultKind::corrupt, 0},
-                                            {"nonsense", NodeFaultKind::nonsense, 0},
-                                            {"babble", NodeFaultKind::babble, 100}}};
+// In the order of NodeFaultKind.
+constexpr std::array<FaultName, 14> node_faults{{{"ok"},
+                                                 {"silent"},
+                                                 {"deaf"},
+                                                 {"drop=ANSWERS", 0, 100'000, true},
+                                                 {"no-status"},
+                                                 {"stale=N", 0, 127, true},
+                                                 {"ahead=N", 0, 127, true},
+                                                 {"stuck"},
+                                                 {"duplicate"},
+                                                 {"swapped"},
+                                                 {"wrong-size=BYTES", 0, 8, true},
+                                                 {"corrupt"},
+                                                 {"nonsense"},
+                                                 {"babble=FRAMES", 0, 100, true}}};
 
 bool is_measurement(const BusFrame& frame) { return frame.id >= 0x92 && frame.id <= 0x94; }
 
@@ -44,31 +40,12 @@ void shift_sequence(BusFrame& frame, unsigned by) {
 
 }  // namespace
 
-const char* NodeFaults::known() {
-  return "ok silent deaf drop=ANSWERS no-status stale=N ahead=N stuck duplicate swapped wrong-size=BYTES corrupt "
-         "nonsense "
-         "babble=FRAMES";
-}
-
 void NodeFaults::set(std::string_view text) {
-  const std::string valid = std::string("one of ") + known();
-  const std::size_t equals = text.find('=');
-  const std::string_view name = text.substr(0, equals);
-  for (const Kind& kind : node_faults) {
-    if (kind.name != name) continue;
-    unsigned number = 0;
-    if ((kind.most > 0) != (equals != std::string_view::npos)) refuse_fault(text, valid);
-    if (kind.most > 0) {
-      const auto given = number_in<unsigned>(text.substr(equals + 1));
-      if (!given || *given > kind.most) refuse_fault(text, valid);
-      number = *given;
-    }
-    kind_ = kind.kind;
-    number_ = number;
-    kept_.clear();
-    return;
-  }
-  refuse_fault(text, valid);
+  const auto given = fault_in(text, node_faults);
+  if (!given) refuse_fault(text, "one of " + usages_of(node_faults, " "));
+  kind_ = static_cast<NodeFaultKind>(given->place);
+  number_ = static_cast<unsigned>(given->number);
+  kept_.clear();
 }
 
 bool NodeFaults::hears(const BusFrame& frame) const noexcept {

@@ -34,7 +34,6 @@ class NodeFaults {
 
   /// Sets a fault such as "stale=5". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text);
-  [[nodiscard]] static const char* known();
   /// True if the node receives this frame.
   [[nodiscard]] bool hears(const BusFrame& frame) const noexcept;
   /// The frames of one answer that reach the bus.

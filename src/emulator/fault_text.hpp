@@ -1,7 +1,11 @@
+// Faults as text, the same for every emulated board: "NAME" or "NAME=NUMBER".
+
 #pragma once
 
 #include <charconv>
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -20,6 +24,45 @@ template <typename Number, typename... Base>
   const char* const end = text.data() + text.size();
   const auto [at, error] = std::from_chars(text.data(), end, value, base...);
   return error == std::errc() && at == end ? std::optional(value) : std::nullopt;
+}
+
+/// A fault by its name, which "=WHAT" follows if it takes a number.
+struct FaultName {
+  std::string_view usage;
+  double least{0.0};
+  double most{0.0};
+  bool whole{false};  ///< the number is an integer
+
+  [[nodiscard]] std::string_view name() const { return usage.substr(0, usage.find('=')); }
+  [[nodiscard]] bool takes_number() const { return usage.find('=') != std::string_view::npos; }
+};
+
+/// All usages in a row.
+[[nodiscard]] inline std::string usages_of(std::span<const FaultName> names, std::string_view between) {
+  std::string text;
+  for (const FaultName& name : names) text.append(text.empty() ? "" : between).append(name.usage);
+  return text;
+}
+
+/// A fault as a user gave it: its place in the table of names, and its number, 0 if it takes none.
+struct GivenFault {
+  std::size_t place{0};
+  double number{0.0};
+};
+/// Nothing if `text` is no fault of the table.
+[[nodiscard]] inline std::optional<GivenFault> fault_in(std::string_view text, std::span<const FaultName> names) {
+  const std::size_t equals = text.find('=');
+  for (std::size_t place = 0; place < names.size(); ++place) {
+    const FaultName& name = names[place];
+    if (name.name() != text.substr(0, equals) || name.takes_number() != (equals != std::string_view::npos)) continue;
+    if (!name.takes_number()) return GivenFault{place};
+    const std::string_view digits = text.substr(equals + 1);
+    const auto number = number_in<double>(digits);
+    if (!number || !(*number >= name.least && *number <= name.most)) return std::nullopt;
+    if (name.whole && !number_in<unsigned>(digits)) return std::nullopt;
+    return GivenFault{place, *number};
+  }
+  return std::nullopt;
 }
 
 }  // namespace abs_hil::emulator

@@ -5,7 +5,6 @@
 #include "emulator/hm2_board.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 namespace abs_hil::emulator {
@@ -47,25 +46,20 @@ constexpr std::uint32_t flash_id = 0x14;
 
 }  // namespace
 
-Hm2Board::Hm2Board(const Hm2Options& options) : options_(options), identity_(options.lie), fpga_(options) {
-  if (options_.name.empty() || options_.name.size() > 16) {
-    throw std::invalid_argument("board name \"" + options_.name + "\": give 1 to 16 characters");
-  }
-  power_cycle();
-}
+Hm2Board::Hm2Board(const Hm2Options& options) : Hm2Fpga(options) { power_cycle(); }
 
 void Hm2Board::power_cycle() {
   memory_ = {};
   pointers_ = {};
-  power_on_ns_ = fpga_.time_ns();
+  power_on_ns_ = time_ns();
   for (std::uint32_t i = 0; i < options_.name.size(); ++i) {
     memory_[board_info][i] = memory_[eeprom][0x10 + i] = static_cast<std::uint8_t>(options_.name[i]);
   }
-  put(board_info, 0x10, 2, identity_.lbp_version());
-  put(board_info, 0x12, 2, identity_.firmware_version());
+  put(board_info, 0x10, 2, identity_.lbp_version);
+  put(board_info, 0x12, 2, identity_.firmware_version);
   for (std::uint32_t i = 0; i < options_.mac.size(); ++i) memory_[eeprom][2 + i] = options_.mac[5 - i];
   for (std::uint32_t i = 0; i < options_.address.size(); ++i) memory_[eeprom][0x20 + i] = options_.address[3 - i];
-  fpga_.power_on();
+  power_on();
 }
 
 Hm2Board::Access Hm2Board::decoded(std::uint32_t command) noexcept {
@@ -179,21 +173,21 @@ void Hm2Board::count_error(std::uint32_t bit) {
 
 std::uint64_t Hm2Board::read(const Access& access, std::uint32_t address) const noexcept {
   if (access.info) return info_word(access.space, address);
-  if (access.space == hostmot2) return fpga_.read32(address & 0xFFFCU);
+  if (access.space == hostmot2) return read32(address & 0xFFFCU);
   if (access.space == flash) return address == flash_id_address ? flash_id : 0;
   if (access.space == timers && address == 0) {
-    return static_cast<std::uint64_t>((fpga_.time_ns() - power_on_ns_) / 1000) & 0xFFFFU;
+    return static_cast<std::uint64_t>((time_ns() - power_on_ns_) / 1000) & 0xFFFFU;
   }
   if (access.space == lock_step) {
     Memory time{};
-    for (std::uint32_t i = 0; i < 8; ++i) time[i] = static_cast<std::uint8_t>(fpga_.time_ns() >> 8U * i);
+    for (std::uint32_t i = 0; i < 8; ++i) time[i] = static_cast<std::uint8_t>(time_ns() >> 8U * i);
     return bytes(time, address, access.unit_bytes);
   }
   return bytes(memory_[access.space], address, access.unit_bytes);
 }
 
 void Hm2Board::write(const Access& access, std::uint32_t address, std::uint64_t value) {
-  if (access.space == hostmot2) return fpga_.write32(address & 0xFFFCU, static_cast<std::uint32_t>(value));
+  if (access.space == hostmot2) return write32(address & 0xFFFCU, static_cast<std::uint32_t>(value));
   const bool read_only = access.space == board_info || access.space == flash || access.space == ethernet_chip;
   const bool locked = access.space == eeprom && bytes(memory_[control], eeprom_enable, 2) != eeprom_key;
   if (read_only || locked) return count_error(write_error);
@@ -202,7 +196,7 @@ void Hm2Board::write(const Access& access, std::uint32_t address, std::uint64_t 
   if (access.space == control) write_control(address);
   if (access.space == lock_step && address + access.unit_bytes == 8) {
     advance_to(static_cast<std::int64_t>(std::min<std::uint64_t>(
-        bytes(memory_[lock_step], 0, 8), static_cast<std::uint64_t>(fpga_.time_ns()) + 10'000'000'000U)));
+        bytes(memory_[lock_step], 0, 8), static_cast<std::uint64_t>(time_ns()) + 10'000'000'000U)));
   }
 }
 
@@ -211,7 +205,7 @@ void Hm2Board::write_control(std::uint32_t address) {
     power_cycle();
   } else if (address == reload_register && bytes(memory_[control], address, 2) != 0) {
     put(control, address, 2, 0);
-    fpga_.power_on();
+    power_on();
   }
 }
 

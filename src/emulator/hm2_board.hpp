@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "emulator/hm2_fpga.hpp"
-#include "emulator/hm2_identity.hpp"
 
 namespace abs_hil::emulator {
 
@@ -17,7 +16,7 @@ namespace abs_hil::emulator {
 ///
 /// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
 /// advances the time by a write of all 8 bytes.
-class Hm2Board final : public UdpBoard {
+class Hm2Board final : public Hm2Fpga {
  public:
   static constexpr std::uint16_t port = 27181;
   static constexpr std::size_t largest_answer = 1472;
@@ -26,24 +25,7 @@ class Hm2Board final : public UdpBoard {
   explicit Hm2Board(const Hm2Options& options);
 
   [[nodiscard]] std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) override;
-  void advance_to(std::int64_t time_ns) override { fpga_.advance_to(time_ns); }
   void power_cycle() override;
-  void bite() override { fpga_.bite("watchdog"); }
-  void press_emergency_stop(bool pressed) override { fpga_.press_emergency_stop(pressed); }
-  void turn_by_hand(bool upper_wheel, double revolutions) override { fpga_.turn_by_hand(upper_wheel, revolutions); }
-  void make_quadrature_error(bool upper_wheel) override { fpga_.make_quadrature_error(upper_wheel); }
-
-  [[nodiscard]] Hm2Fpga& fpga() noexcept { return fpga_; }
-  [[nodiscard]] const Hm2Fpga& fpga() const noexcept { return fpga_; }
-  [[nodiscard]] std::int64_t time_ns() const noexcept override { return fpga_.time_ns(); }
-  [[nodiscard]] Outputs outputs() const noexcept override { return fpga_.outputs(); }
-  [[nodiscard]] const plant_sim::Plant& plant() const noexcept override { return fpga_.plant(); }
-  [[nodiscard]] bool bitten() const noexcept override { return fpga_.bitten(); }
-  [[nodiscard]] bool drives_pins() const noexcept override { return fpga_.drives_pins(); }
-  /// Writes to the space of the timers do not count.
-  [[nodiscard]] std::uint64_t writes() const noexcept override { return writes_; }
-  [[nodiscard]] OutputLog& log() noexcept override { return fpga_.log(); }
-  [[nodiscard]] std::string registers_text() const override { return fpga_.registers_text(); }
 
  private:
   static constexpr std::uint32_t space_count = 8;
@@ -65,13 +47,9 @@ class Hm2Board final : public UdpBoard {
   [[nodiscard]] std::uint64_t bytes(const Memory& memory, std::uint32_t address, std::uint32_t count) const noexcept;
   void put(std::uint32_t space, std::uint32_t address, std::uint32_t count, std::uint64_t value) noexcept;
 
-  Hm2Options options_;
-  Hm2Identity identity_;
-  Hm2Fpga fpga_;
   std::array<Memory, space_count> memory_{};
   std::array<std::uint32_t, space_count> pointers_{};
   std::int64_t power_on_ns_{0};
-  std::uint64_t writes_{0};
 };
 
 }  // namespace abs_hil::emulator

@@ -40,14 +40,12 @@ void check_pair(const char* what, std::uint32_t a, std::uint32_t b) {
 
 }  // namespace
 
-Hm2Fpga::Hm2Fpga(const Hm2Options& options)
-    : RigBehind(options.plant, options.start_speed_rad_s), options_(options), identity_(options.lie) {
+Hm2Fpga::Hm2Fpga(const Hm2Options& options) : UdpBoard(options), identity_(options.lie) {
   check_pair("PWM generators", options.drive_pwm, options.brake_pwm);
   check_pair("counters", options.lower_encoder, options.upper_encoder);
   if (options.enable_pin < -1 || options.enable_pin >= static_cast<std::int32_t>(port_count * pins_per_port)) {
     throw std::invalid_argument("enable pin " + std::to_string(options.enable_pin) + ": give -1 to 33");
   }
-  power_on();
 }
 
 void Hm2Fpga::power_on() {
@@ -167,7 +165,7 @@ void Hm2Fpga::load_watchdog(std::uint32_t clocks) {
   last_pet_ns_ = time_ns();
   armed_ = clocks < disabled;
   bites_ns_ = time_ns() + (std::int64_t{clocks} + watchdog_lag_clocks) * ns_per_clock;
-  if (was_armed && !armed_) bite("watchdog switched off");
+  if (was_armed && !armed_) bite_for("watchdog switched off");
 }
 
 std::uint32_t Hm2Fpga::watchdog_counter() const noexcept {
@@ -175,7 +173,7 @@ std::uint32_t Hm2Fpga::watchdog_counter() const noexcept {
   return static_cast<std::uint32_t>(std::max<std::int64_t>(0, (bites_ns_ - time_ns()) / ns_per_clock));
 }
 
-void Hm2Fpga::bite(const std::string& why) {
+void Hm2Fpga::bite_for(const std::string& why) {
   armed_ = false;
   status_ = 1;
   for (Port& port : ports_) port.ddr = port.open_drain = 0;
@@ -275,8 +273,6 @@ Outputs Hm2Fpga::outputs() const noexcept {
           .brake_duty = acting(options_.brake_pwm * pins_per_port + 1)};
 }
 
-void Hm2Fpga::note_outputs(const std::string& why) { log_.note(time_ns(), outputs(), why, last_pet_ns_); }
-
 // Time.
 
 std::int64_t Hm2Fpga::step_end_ns(std::int64_t next_ns) const noexcept {
@@ -296,12 +292,7 @@ void Hm2Fpga::after_step(const plant_sim::PlantState& before, std::int64_t from_
     g.value = *std::exchange(g.waiting, std::nullopt);
     note_outputs("commanded");
   }
-  if (armed_ && time_ns() >= bites_ns_) bite("watchdog");
-}
-
-void Hm2Fpga::press_emergency_stop(bool pressed) {
-  RigBehind::press_emergency_stop(pressed);
-  note_outputs("emergency stop");
+  if (armed_ && time_ns() >= bites_ns_) bite();
 }
 
 void Hm2Fpga::turn_by_hand(bool upper_wheel, double revolutions) {
@@ -311,8 +302,6 @@ void Hm2Fpga::turn_by_hand(bool upper_wheel, double revolutions) {
   count(upper_wheel, upper_wheel ? before.angle1_rad : before.angle2_rad,
         upper_wheel ? after.angle1_rad : after.angle2_rad, time_ns(), time_ns());
 }
-
-void Hm2Fpga::make_quadrature_error(bool upper_wheel) { counter_of(upper_wheel).error = true; }
 
 std::string Hm2Fpga::registers_text() const {
   std::string text;

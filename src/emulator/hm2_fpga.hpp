@@ -6,7 +6,6 @@
 #include <string>
 
 #include "emulator/hm2_identity.hpp"
-#include "emulator/rig_behind.hpp"
 #include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {
@@ -16,7 +15,7 @@ namespace abs_hil::emulator {
 ///
 /// A bite of the watchdog clears DDR and open drain. The pins are then inputs, which resistors pull high. All other
 /// registers stay: counters count on, PWM generators keep their values.
-class Hm2Fpga final : public RigBehind {
+class Hm2Fpga : public UdpBoard {
  public:
   static constexpr std::uint32_t clock_low_Hz = 100'000'000;
   static constexpr std::uint32_t clock_high_Hz = 200'000'000;
@@ -30,19 +29,17 @@ class Hm2Fpga final : public RigBehind {
 
   /// All registers as after power-on. The wheels go on turning.
   void power_on();
-  void bite(const std::string& why);
-  void press_emergency_stop(bool pressed);  ///< cuts the drive only
-  void turn_by_hand(bool upper_wheel, double revolutions);
-  /// Sets the quadrature error bit of a wheel's counter, as a wrong edge does.
-  void make_quadrature_error(bool upper_wheel);
+  void bite() override { bite_for("watchdog"); }
+  void turn_by_hand(bool upper_wheel, double revolutions) override;
+  void make_quadrature_error(bool upper_wheel) override { counter_of(upper_wheel).error = true; }
 
   [[nodiscard]] Outputs outputs() const noexcept override;
-  [[nodiscard]] bool bitten() const noexcept { return status_ != 0; }
-  /// True while any pin is an output.
-  [[nodiscard]] bool drives_pins() const noexcept;
-  [[nodiscard]] OutputLog& log() noexcept { return log_; }
-  /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
-  [[nodiscard]] std::string registers_text() const;
+  [[nodiscard]] bool bitten() const noexcept override { return status_ != 0; }
+  [[nodiscard]] bool drives_pins() const noexcept override;
+  [[nodiscard]] std::string registers_text() const override;
+
+ protected:
+  Hm2Identity identity_;
 
  private:
   static constexpr std::uint32_t port_count = 2;
@@ -72,6 +69,7 @@ class Hm2Fpga final : public RigBehind {
   void write_counter(std::uint32_t reg, std::uint32_t i, std::uint32_t value) noexcept;
   void write_generator(std::uint32_t reg, std::uint32_t i, std::uint32_t value) noexcept;
   void load_watchdog(std::uint32_t clocks);
+  void bite_for(const std::string& why);
   [[nodiscard]] std::uint32_t watchdog_counter() const noexcept;
   [[nodiscard]] std::uint32_t time_stamp(std::int64_t time_ns) const noexcept;
   [[nodiscard]] double period_ns(const Generator& g) const noexcept;
@@ -84,10 +82,8 @@ class Hm2Fpga final : public RigBehind {
   void after_step(const plant_sim::PlantState& before, std::int64_t from_ns) override;
   [[nodiscard]] Counter& counter_of(bool upper_wheel) noexcept;
   void count(bool upper_wheel, double from_rad, double to_rad, std::int64_t from_ns, std::int64_t to_ns) noexcept;
-  void note_outputs(const std::string& why);
+  void note_outputs(const std::string& why) override { log_.note(time_ns(), outputs(), why, last_pet_ns_); }
 
-  Hm2Options options_;
-  Hm2Identity identity_;
   std::array<Port, port_count> ports_{};
   std::array<Generator, 2> generators_{};
   std::array<Counter, 2> counters_{};
@@ -102,7 +98,6 @@ class Hm2Fpga final : public RigBehind {
   bool armed_{false};
   std::int64_t bites_ns_{0};      ///< when the armed watchdog bites
   std::int64_t last_pet_ns_{-1};  ///< last reload of the watchdog; -1: none since power-on
-  OutputLog log_{};
 };
 
 }  // namespace abs_hil::emulator

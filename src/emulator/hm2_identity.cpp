@@ -58,78 +58,64 @@ std::vector<std::uint32_t> stock_words() {
   return words;
 }
 
-}  // namespace
+std::uint32_t& at(Hm2Identity& board, std::uint32_t address) { return board.words[address / 4]; }
+/// The first word of a module's descriptor, or the one `word` words after it.
+std::uint32_t& module(Hm2Identity& board, std::uint32_t place, std::uint32_t word = 0) {
+  return board.words[modules / 4 + module_words * place + word];
+}
+void set_instances(Hm2Identity& board, std::uint32_t place, std::uint32_t instances) {
+  module(board, place) = (module(board, place) & 0x00FFFFFFU) | instances << 24U;
+}
 
 /// A lie about one thing, and what it changes.
-struct Hm2Lie {
+struct Lie {
   std::string_view name;
   void (*tell)(Hm2Identity&);
-
-  static std::uint32_t& at(Hm2Identity& board, std::uint32_t address) { return board.words_[address / 4]; }
-  static std::uint32_t& module(Hm2Identity& board, std::uint32_t place, std::uint32_t word) {
-    return board.words_[modules / 4 + module_words * place + word];
-  }
-  static void set_instances(Hm2Identity& board, std::uint32_t place, std::uint32_t instances) {
-    std::uint32_t& word = module(board, place, 0);
-    word = (word & 0x00FFFFFFU) | instances << 24U;
-  }
-  static void set_base(Hm2Identity& board, std::uint32_t place, std::uint32_t base) {
-    std::uint32_t& word = module(board, place, 1);
-    word = (word & 0xFFFF0000U) | base;
-  }
-  static void set_versions(Hm2Identity& board, std::uint16_t lbp, std::uint16_t firmware) {
-    board.lbp_version_ = lbp;
-    board.firmware_version_ = firmware;
-  }
 };
-
-namespace {
-
-constexpr std::array<Hm2Lie, 22> hm2_lies{{
-    {"cookie", [](Hm2Identity& b) { Hm2Lie::at(b, 0x100) = 0x55AACAFF; }},
-    {"not-hostmot2", [](Hm2Identity& b) { Hm2Lie::at(b, 0x108) = text_word("MOT3"); }},
-    {"idrom-outside", [](Hm2Identity& b) { Hm2Lie::at(b, 0x10C) = 0xFFF0; }},
-    {"idrom-type", [](Hm2Identity& b) { Hm2Lie::at(b, idrom) = 9; }},
-    {"modules-outside", [](Hm2Identity& b) { Hm2Lie::at(b, idrom + 4) = 0xFFFF; }},
-    {"width", [](Hm2Identity& b) { Hm2Lie::at(b, idrom + 32) = 72; }},
-    {"port-width", [](Hm2Identity& b) { Hm2Lie::at(b, idrom + 36) = 40; }},
-    {"clock-zero", [](Hm2Identity& b) { Hm2Lie::at(b, idrom + 40) = Hm2Lie::at(b, idrom + 44) = 0; }},
-    {"strides", [](Hm2Identity& b) { Hm2Lie::at(b, idrom + 48) = Hm2Lie::at(b, idrom + 56) = 0; }},
-    {"no-watchdog", [](Hm2Identity& b) { Hm2Lie::module(b, 0, 0) = 0x010100C3; }},
-    {"no-counters", [](Hm2Identity& b) { Hm2Lie::module(b, place_of_counters, 0) = 0x020102C3; }},
-    {"no-pwm", [](Hm2Identity& b) { Hm2Lie::module(b, place_of_pwm, 0) = 0x020200C3; }},
-    {"one-counter", [](Hm2Identity& b) { Hm2Lie::set_instances(b, place_of_counters, 1); }},
-    {"one-pwm", [](Hm2Identity& b) { Hm2Lie::set_instances(b, place_of_pwm, 1); }},
-    {"255-instances", [](Hm2Identity& b) { Hm2Lie::set_instances(b, place_of_pwm, 255); }},
-    {"base-outside", [](Hm2Identity& b) { Hm2Lie::set_base(b, place_of_counters, 0xFFFC); }},
-    {"version", [](Hm2Identity& b) { Hm2Lie::module(b, place_of_pwm, 0) |= 0x00000900U; }},
+constexpr std::array<Lie, 22> lies_told{{
+    {"cookie", [](Hm2Identity& b) { at(b, 0x100) = 0x55AACAFF; }},
+    {"not-hostmot2", [](Hm2Identity& b) { at(b, 0x108) = text_word("MOT3"); }},
+    {"idrom-outside", [](Hm2Identity& b) { at(b, 0x10C) = 0xFFF0; }},
+    {"idrom-type", [](Hm2Identity& b) { at(b, idrom) = 9; }},
+    {"modules-outside", [](Hm2Identity& b) { at(b, idrom + 4) = 0xFFFF; }},
+    {"width", [](Hm2Identity& b) { at(b, idrom + 32) = 72; }},
+    {"port-width", [](Hm2Identity& b) { at(b, idrom + 36) = 40; }},
+    {"clock-zero", [](Hm2Identity& b) { at(b, idrom + 40) = at(b, idrom + 44) = 0; }},
+    {"strides", [](Hm2Identity& b) { at(b, idrom + 48) = at(b, idrom + 56) = 0; }},
+    {"no-watchdog", [](Hm2Identity& b) { module(b, 0) = 0x010100C3; }},
+    {"no-counters", [](Hm2Identity& b) { module(b, place_of_counters) = 0x020102C3; }},
+    {"no-pwm", [](Hm2Identity& b) { module(b, place_of_pwm) = 0x020200C3; }},
+    {"one-counter", [](Hm2Identity& b) { set_instances(b, place_of_counters, 1); }},
+    {"one-pwm", [](Hm2Identity& b) { set_instances(b, place_of_pwm, 1); }},
+    {"255-instances", [](Hm2Identity& b) { set_instances(b, place_of_pwm, 255); }},
+    {"base-outside", [](Hm2Identity& b) { module(b, place_of_counters, 1) |= 0xFFFC; }},
+    {"version", [](Hm2Identity& b) { module(b, place_of_pwm) |= 0x00000900U; }},
     {"endless",
      [](Hm2Identity& b) {
-       for (std::uint32_t a = modules + 60; a < pins; a += 4) Hm2Lie::at(b, a) = 0x010100C3;
+       for (std::uint32_t a = modules + 60; a < pins; a += 4) at(b, a) = 0x010100C3;
      }},
-    {"pins", [](Hm2Identity& b) { Hm2Lie::at(b, pins + 4) = Hm2Lie::at(b, pins + 4 * 18) = pin(0, 0, 0); }},
+    {"pins", [](Hm2Identity& b) { at(b, pins + 4) = at(b, pins + 4 * 18) = pin(0, 0, 0); }},
     {"all-ones",
      [](Hm2Identity& b) {
-       for (std::uint32_t a = 0x100; a < pins + 512; a += 4) Hm2Lie::at(b, a) = 0xFFFFFFFF;
+       for (std::uint32_t a = 0x100; a < pins + 512; a += 4) at(b, a) = 0xFFFFFFFF;
      }},
-    {"lbp-version", [](Hm2Identity& b) { Hm2Lie::set_versions(b, 2, b.firmware_version()); }},
-    {"firmware", [](Hm2Identity& b) { Hm2Lie::set_versions(b, b.lbp_version(), 3); }},
+    {"lbp-version", [](Hm2Identity& b) { b.lbp_version = 2; }},
+    {"firmware", [](Hm2Identity& b) { b.firmware_version = 3; }},
 }};
 
 }  // namespace
 
 std::string Hm2Identity::lies() {
   std::string all;
-  for (const Hm2Lie& lie : hm2_lies) all.append(lie.name).append(" ");
+  for (const Lie& lie : lies_told) all.append(lie.name).append(" ");
   all.pop_back();
   return all;
 }
 
-Hm2Identity::Hm2Identity(std::string_view lie) : words_(stock_words()) {
+Hm2Identity::Hm2Identity(std::string_view lie) : words(stock_words()) {
   if (lie.empty()) return;
-  const auto* const told =
-      std::find_if(hm2_lies.begin(), hm2_lies.end(), [lie](const Hm2Lie& l) { return l.name == lie; });
-  if (told == hm2_lies.end()) refuse_fault(lie, "one of " + lies());
+  const auto told = std::ranges::find(lies_told, lie, &Lie::name);
+  if (told == lies_told.end()) refuse_fault(lie, "one of " + lies());
   told->tell(*this);
 }
 

@@ -29,25 +29,19 @@ struct Hm2Options {
 
 /// The part of a HostMot2's registers that never changes: cookie, IDROM, module and pin descriptors of the firmware
 /// G540x2 on a 7I92.
-class Hm2Identity {
- public:
+struct Hm2Identity {
   /// Throws std::invalid_argument for an unknown lie.
   explicit Hm2Identity(std::string_view lie = {});
 
   [[nodiscard]] std::uint32_t word(std::uint32_t address) const noexcept {
-    return address / 4 < words_.size() ? words_[address / 4] : 0;
+    return address / 4 < words.size() ? words[address / 4] : 0;
   }
-  /// LBP16 version and firmware version that the board reports.
-  [[nodiscard]] std::uint16_t lbp_version() const noexcept { return lbp_version_; }
-  [[nodiscard]] std::uint16_t firmware_version() const noexcept { return firmware_version_; }
   /// All lies, separated by blanks.
   [[nodiscard]] static std::string lies();
 
- private:
-  friend struct Hm2Lie;
-  std::vector<std::uint32_t> words_;
-  std::uint16_t lbp_version_{3};
-  std::uint16_t firmware_version_{17};
+  std::vector<std::uint32_t> words;
+  std::uint16_t lbp_version{3};  ///< that the board reports, as the next
+  std::uint16_t firmware_version{17};
 };
 
 }  // namespace abs_hil::emulator

@@ -11,40 +11,23 @@
 
 namespace abs_hil::emulator {
 
-struct Hm2Link::Name {
-  std::string_view text;
-  Kind kind;
-  double most;  ///< largest number; 0: takes no number
-};
-
-const char* Hm2Link::known() {
-  return "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage";
-}
-
 void Hm2Link::set(std::string_view text) {
-  static constexpr std::array<Name, 10> names{{{"ok", Kind::ok, 0},
-                                               {"loss", Kind::loss, 100},
-                                               {"lose-requests", Kind::lose_requests, 1e6},
-                                               {"lose-answers", Kind::lose_answers, 1e6},
-                                               {"delay", Kind::delay, 1e7},
-                                               {"reorder", Kind::reorder, 0},
-                                               {"duplicate", Kind::duplicate, 0},
-                                               {"stale", Kind::stale, 0},
-                                               {"short", Kind::too_short, 1472},
-                                               {"garbage", Kind::garbage, 0}}};
-  const std::string valid = std::string("one of ") + known();
-  const std::size_t equals = text.find('=');
-  for (const Name& name : names) {
-    if (name.text != text.substr(0, equals)) continue;
-    if ((name.most > 0) != (equals != std::string_view::npos)) refuse_fault(text, valid);
-    const auto number = name.most > 0 ? number_in<double>(text.substr(equals + 1)) : std::optional(0.0);
-    if (!number || !(*number >= 0.0 && *number <= name.most)) refuse_fault(text, valid);
-    kind_ = name.kind;
-    number_ = *number;
-    kept_.reset();
-    return;
-  }
-  refuse_fault(text, valid);
+  // In the order of Kind.
+  static constexpr std::array<FaultName, 10> names{{{"ok"},
+                                                    {"loss=PERCENT", 0, 100},
+                                                    {"lose-requests=N", 0, 1e6},
+                                                    {"lose-answers=N", 0, 1e6},
+                                                    {"delay=US", 0, 1e7},
+                                                    {"reorder"},
+                                                    {"duplicate"},
+                                                    {"stale"},
+                                                    {"short=BYTES", 0, 1472},
+                                                    {"garbage"}}};
+  const auto given = fault_in(text, names);
+  if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
+  kind_ = static_cast<Kind>(given->place);
+  number_ = given->number;
+  kept_.reset();
 }
 
 void Hm2Link::plug(bool in) {

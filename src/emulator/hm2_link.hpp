@@ -32,7 +32,6 @@ class Hm2Link {
   ///   garbage          every answer is random bytes of its length
   /// Throws std::invalid_argument with the valid faults.
   void set(std::string_view text);
-  [[nodiscard]] static const char* known();
   /// Pulls or plugs the cable. What was under way is lost.
   void plug(bool in);
   [[nodiscard]] bool plugged() const noexcept { return plugged_; }
@@ -59,7 +58,6 @@ class Hm2Link {
     too_short,
     garbage
   };
-  struct Name;
   struct Waiting {
     std::int64_t due_ns{0};
     Hm2Datagram answer{};

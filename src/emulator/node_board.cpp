@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <stdexcept>
 
 namespace abs_hil::emulator {
 
@@ -36,10 +35,7 @@ void for_each_command(std::span<const std::uint8_t> datagram, Use use) {
 
 }  // namespace
 
-NodeBoard::NodeBoard(const Hm2Options& options) : options_(options), rig_(*this, options) {
-  if (options.name.empty() || options.name.size() > 16) {
-    throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
-  }
+NodeBoard::NodeBoard(const Hm2Options& options) : UdpBoard(options) {
   std::memcpy(identity_.name, options.name.data(), options.name.size());
   std::memcpy(identity_.idrom_name, options.name.starts_with("7I92") ? "MESA7I92" : "ABS-NODE", 8);
   std::memcpy(identity_.mac, options.mac.data(), sizeof identity_.mac);
@@ -51,35 +47,34 @@ void NodeBoard::power_cycle() {
   node_init(&core_, &identity_);
   look();
   for (std::uint32_t& count : core_.count) count = 0;
-  note("power-on");
+  note_outputs("power-on");
 }
 
-Outputs NodeBoard::Rig::outputs() const noexcept {
-  const auto duty = [this](std::uint32_t channel) { return node_duty(&board_.core_, channel) / 4096.0; };
-  const bool enabled = board_.options_.enable_pin < 0 || node_output(&board_.core_);
-  return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(board_.options_.drive_pwm),
-          .brake_duty = duty(board_.options_.brake_pwm)};
+Outputs NodeBoard::outputs() const noexcept {
+  const auto duty = [this](std::uint32_t channel) { return node_duty(&core_, channel) / 4096.0; };
+  const bool enabled = options_.enable_pin < 0 || node_output(&core_);
+  return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(options_.drive_pwm),
+          .brake_duty = duty(options_.brake_pwm)};
 }
 
-std::int64_t NodeBoard::Rig::step_end_ns(std::int64_t next_ns) const noexcept {
-  const node_core& core = board_.core_;
-  if (!core.armed) return next_ns;
-  const auto left_us = static_cast<std::int32_t>(core.fed_us + core.allowed_us - board_.now_us());
+std::int64_t NodeBoard::step_end_ns(std::int64_t next_ns) const noexcept {
+  if (!core_.armed) return next_ns;
+  const auto left_us = static_cast<std::int32_t>(core_.fed_us + core_.allowed_us - now_us());
   return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
 }
 
 void NodeBoard::look() {
   for (const bool upper : {false, true}) {
     node_count(&core_, upper ? options_.upper_encoder : options_.lower_encoder,
-               static_cast<std::uint16_t>(rig_.position(upper)), now_us());
+               static_cast<std::uint16_t>(position(upper)), now_us());
   }
   const bool was_latched = core_.latched;
   node_poll(&core_, now_us());
   if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
-  note("watchdog");
+  note_outputs("watchdog");
 }
 
-void NodeBoard::note(const std::string& why) {
+void NodeBoard::note_outputs(const std::string& why) {
   const auto since_us = static_cast<std::int64_t>(now_us() - core_.fed_us);
   const bool never = core_.watchdog_clocks == 0x80000000U;
   log_.note(time_ns(), outputs(), why, never ? -1 : time_ns() - 1000 * since_us);
@@ -117,7 +112,7 @@ std::vector<std::uint8_t> NodeBoard::answer(std::span<const std::uint8_t> datagr
   });
   if (writes) ++writes_;
   if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
-  note(core_.latched && !was_latched ? "watchdog" : "commanded");
+  note_outputs(core_.latched && !was_latched ? "watchdog" : "commanded");
   return reply;
 }
 
@@ -127,16 +122,11 @@ void NodeBoard::bite() {
   look();
 }
 
-void NodeBoard::press_emergency_stop(bool pressed) {
-  rig_.press_emergency_stop(pressed);
-  note("emergency stop");
-}
-
 void NodeBoard::turn_by_hand(bool upper_wheel, double revolutions) {
   // In parts that the 16 bits of the hardware's counter can tell from turns backwards.
   constexpr int parts = 64;
   for (int n = 0; n < parts; ++n) {
-    rig_.turn_by_hand(upper_wheel, revolutions / parts);
+    UdpBoard::turn_by_hand(upper_wheel, revolutions / parts);
     look();
   }
 }

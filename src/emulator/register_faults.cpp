@@ -10,23 +10,15 @@ namespace abs_hil::emulator {
 
 namespace {
 
-struct RegisterFaultKind {
-  std::string_view name;
-  FaultKind kind;
-  double least{1.0};  ///< of the parameter; above `most`: it takes none
-  double most{0.0};
-};
-constexpr std::array<RegisterFaultKind, 8> register_faults{{{"ok", FaultKind::ok},
-                                                            {"stuck", FaultKind::stuck},
-                                                            {"wrong", FaultKind::wrong, -2147483648.0, 2147483648.0},
-                                                            {"slow", FaultKind::slow, 0.0, 10e6},
-                                                            {"delayed", FaultKind::delayed, 1.0, 1e5},
-                                                            {"intermittent", FaultKind::intermittent, 0.0, 1.0},
-                                                            {"off", FaultKind::off},
-                                                            {"garbage", FaultKind::garbage}}};
-constexpr std::string_view valid_register_fault =
-    "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of ok, stuck, wrong=ADDEND, slow=US, "
-    "delayed=READS, intermittent=PROBABILITY, off, garbage";
+// In the order of FaultKind.
+constexpr std::array<FaultName, 8> register_faults{{{"ok"},
+                                                    {"stuck"},
+                                                    {"wrong=ADDEND", -2147483648.0, 2147483648.0},
+                                                    {"slow=US", 0.0, 10e6},
+                                                    {"delayed=READS", 1.0, 1e5},
+                                                    {"intermittent=PROBABILITY", 0.0, 1.0},
+                                                    {"off"},
+                                                    {"garbage"}}};
 
 std::optional<std::uint32_t> offset_in(std::string_view digits) {
   if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
@@ -43,24 +35,13 @@ void FaultyCard::set(std::uint32_t offset, const Fault& fault) {
 
 void FaultyCard::set(std::string_view text) {
   const std::size_t colon = text.find(':');
-  if (colon == std::string_view::npos) refuse_fault(text, valid_register_fault);
-  const std::optional<std::uint32_t> offset = offset_in(text.substr(0, colon));
-  if (!offset) refuse_fault(text, valid_register_fault);
-  std::string_view name = text.substr(colon + 1);
-  std::optional<double> parameter;
-  if (const std::size_t equals = name.find('='); equals != std::string_view::npos) {
-    parameter = number_in<double>(name.substr(equals + 1));
-    if (!parameter) refuse_fault(text, valid_register_fault);
-    name = name.substr(0, equals);
+  const auto offset = colon == std::string_view::npos ? std::nullopt : offset_in(text.substr(0, colon));
+  const auto given = offset ? fault_in(text.substr(colon + 1), register_faults) : std::nullopt;
+  if (!given) {
+    refuse_fault(text, "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of " +
+                           usages_of(register_faults, ", "));
   }
-  const auto known = std::ranges::find(register_faults, name, &RegisterFaultKind::name);
-  if (known == register_faults.end() || (known->least <= known->most) != parameter.has_value()) {
-    refuse_fault(text, valid_register_fault);
-  }
-  if (parameter && !(*parameter >= known->least && *parameter <= known->most)) {
-    refuse_fault(text, valid_register_fault);
-  }
-  set(*offset, {.kind = known->kind, .parameter = parameter.value_or(0.0)});
+  set(*offset, {.kind = static_cast<FaultKind>(given->place), .parameter = given->number});
 }
 
 bool FaultyCard::fails(const Fault& fault) {

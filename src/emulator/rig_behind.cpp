@@ -35,7 +35,7 @@ void RigBehind::advance_to(std::int64_t time_ns) {
   }
 }
 
-void RigBehind::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
+void RigBehind::turn_by_hand(bool upper_wheel, double revolutions) {
   plant_sim::PlantState state = plant_.state();
   (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
   plant_.reset(state);

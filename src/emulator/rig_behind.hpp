@@ -36,9 +36,9 @@ class RigBehind {
   /// independent of the times of the host's accesses.
   void advance_to(std::int64_t time_ns);
 
-  void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
+  virtual void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }  ///< cuts the drive only
   /// Turns a standing wheel by hand.
-  void turn_by_hand(bool upper_wheel, double revolutions) noexcept;
+  virtual void turn_by_hand(bool upper_wheel, double revolutions);
 
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
   /// True speeds and torques for the emulator's own log; the board does not show them.

@@ -34,7 +34,7 @@ TEST_CASE("Duty = value / 4096, by inverted pins whose source is the generator; 
   write32(board, 0x4000, 1024U << 16U);
   CHECK(board.outputs().brake_duty == 2866.0 / 4096.0);
   CHECK(board.outputs().drive_duty == 0.25);
-  board.fpga().press_emergency_stop(true);
+  board.press_emergency_stop(true);
   CHECK(board.outputs().drive_duty == 0.0);
   CHECK(board.outputs().brake_duty == 2866.0 / 4096.0);
   // Values cannot be read back; levels of pins can.
@@ -89,7 +89,7 @@ TEST_CASE("The watchdog bites N + 3 or 4 clocks after the load; a bite clears DD
   CHECK(read32(board, 0x0D00) == 1);
   CHECK(read32(board, 0x1100) == 0);
   CHECK(read32(board, 0x1104) == 0);
-  CHECK_THAT(board.fpga().registers_text(), Contains("1300=00000000") && Contains("4004=07d00000"));
+  CHECK_THAT(board.registers_text(), Contains("1300=00000000") && Contains("4004=07d00000"));
   const auto events = board.log().take_events();
   REQUIRE(events.size() >= 2);
   CHECK(events.back().text == "outputs zero: watchdog; watchdog last reloaded 5.000 ms ago");
@@ -179,14 +179,14 @@ TEST_CASE("Counts wrap at 16 bits and are the encoder's; count and stamps give t
 
 TEST_CASE("Hand-turned wheels count backwards; a write clears a counter; the error bit latches") {
   Hm2Board board({});
-  board.fpga().turn_by_hand(true, -0.5);
+  board.turn_by_hand(true, -0.5);
   CHECK((read32(board, 0x3004) & 0xFFFF) == 0x10000 - 2048);
   CHECK((read32(board, 0x3000) & 0xFFFF) == 0);
   write32(board, 0x3004, 0);
   CHECK((read32(board, 0x3004) & 0xFFFF) == 0);
   write32(board, 0x3104, 0x0800);
   CHECK((read32(board, 0x3104) & 0xFFF8) == 0x0800);
-  board.fpga().make_quadrature_error(true);
+  board.make_quadrature_error(true);
   CHECK((read32(board, 0x3104) & 0xFFF8) == 0x8800);
   write32(board, 0x3104, 0x8800);
   CHECK((read32(board, 0x3104) & 0xFFF8) == 0x8800);
@@ -195,7 +195,7 @@ TEST_CASE("Hand-turned wheels count backwards; a write clears a counter; the err
   CHECK((read32(board, 0x3100) & 0xFFF8) == 0);
   // One count more changes one of the lines A and B.
   const unsigned lines = read32(board, 0x3104) & 3U;
-  board.fpga().turn_by_hand(true, 1.0 / 4096.0);
+  board.turn_by_hand(true, 1.0 / 4096.0);
   const unsigned changed = lines ^ (read32(board, 0x3104) & 3U);
   CHECK((changed == 1 || changed == 2));
 }
@@ -203,12 +203,12 @@ TEST_CASE("Hand-turned wheels count backwards; a write clears a counter; the err
 TEST_CASE("A power cycle and a reset leave every register as at power-on; the wheels turn on") {
   for (const bool by_network : {false, true}) {
     Hm2Board board({.start_speed_rad_s = 50.0});
-    const std::string fresh = board.fpga().registers_text();
+    const std::string fresh = board.registers_text();
     activate(board);
     set_brake(board, 2000);
     board.advance_to(100 * ms);
     by_network ? static_cast<void>(ask(board, "81D91C000100")) : board.power_cycle();
-    CHECK(board.fpga().registers_text() == fresh);
+    CHECK(board.registers_text() == fresh);
     CHECK(board.outputs().brake_duty == 0.0);
     CHECK(number(ask(board, "01510000"), 0, 2) == 0);
     CHECK((read32(board, 0x3000) & 0xFFFF) == 0);

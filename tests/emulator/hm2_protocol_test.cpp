@@ -103,7 +103,7 @@ TEST_CASE("Any datagram is answered within a packet, and two boards answer the s
     const Bytes answer = one.answer(datagram);
     if (answer.size() > Hm2Board::largest_answer || answer != two.answer(datagram)) FAIL("datagram " << n);
   }
-  CHECK(one.fpga().registers_text() == two.fpga().registers_text());
+  CHECK(one.registers_text() == two.registers_text());
 }
 
 TEST_CASE("LinuxCNC's recorded datagrams get the recorded answers, but for levels, counts and times") {
