@@ -53,6 +53,12 @@ void ControlCommand::refuse(const std::string& known) const {
   throw std::invalid_argument("unknown command \"" + line_ + "\"; known are\n" + known);
 }
 
+void say_events(const std::vector<emulator::NodeEvent>& events) {
+  for (const emulator::NodeEvent& event : events) {
+    say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
+  }
+}
+
 ControlFifo::ControlFifo(const std::string& path) {
   if (path.empty()) return;
   if (::mkfifo(path.c_str(), 0600) != 0 && errno != EEXIST) {
@@ -85,14 +91,15 @@ void open_for_writing(std::ofstream& stream, const std::string& file) {
   if (!stream) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
 }
 
-TruthFile::TruthFile(const std::string& file, bool with_trip_flags) {
-  if (file.empty()) return;
-  open_for_writing(stream_, file);
+BoardTime::BoardTime(bool lock_step, const std::string& truth_file, bool with_trip_flags) : lock_step_(lock_step) {
+  restart();
+  if (truth_file.empty()) return;
+  open_for_writing(stream_, truth_file);
   stream_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty"
           << (with_trip_flags ? ",trip_flags\n" : "\n");
 }
 
-void TruthFile::write(std::int64_t time_ns, const rig::PlantTruth& truth, const emulator::Outputs& out) {
+void BoardTime::write(std::int64_t time_ns, const rig::PlantTruth& truth, const emulator::Outputs& out) {
   stream_ << fmt::format("{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.6f},{:.6f}", static_cast<double>(time_ns) * 1e-9,
                          truth.speeds.omega1_rad_s, truth.speeds.omega2_rad_s, truth.slip, truth.brake_torque_Nm,
                          truth.theta_N, out.drive_duty, out.brake_duty);

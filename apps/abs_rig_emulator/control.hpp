@@ -15,6 +15,7 @@
 
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
+#include "emulator/can_node.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::program {
@@ -54,8 +55,9 @@ template <class Board>
 struct ControlRow {
   std::string_view usage;
   std::string_view meaning;
-  void (*obey)(Board&, const ControlCommand&);
+  void (*obey)(Board&, const ControlCommand&){nullptr};  ///< null: it only answers
   bool any_arguments{false};
+  std::string (Board::*answer)() const {&Board::status};
 
   [[nodiscard]] bool is(const ControlCommand& command) const {
     const auto arguments = static_cast<std::size_t>(std::count(usage.begin(), usage.end(), ' '));
@@ -72,14 +74,18 @@ template <class Board>
   return text + fmt::format("{:<31} {}\n", "status", "duties on the wire, speeds, and what the board tells");
 }
 
-/// Obeys one line. Throws std::invalid_argument for an unknown command.
+/// Obeys one line and returns its answer. Throws std::invalid_argument for an unknown command.
 template <class Board>
-void obey_row(Board& board, std::span<const ControlRow<Board>> rows, const ControlCommand& command) {
-  if (command.is("status", 0)) return;
-  for (const ControlRow<Board>& row : rows) {
-    if (row.is(command)) return row.obey(board, command);
+[[nodiscard]] std::string obey_line(Board& board, std::string_view line) {
+  const ControlCommand command(line);
+  if (command.empty()) return {};
+  if (command.is("status", 0)) return board.status();
+  for (const ControlRow<Board>& row : Board::rows()) {
+    if (!row.is(command)) continue;
+    if (row.obey != nullptr) row.obey(board, command);
+    return (board.*row.answer)();
   }
-  command.refuse(help_of(rows));
+  command.refuse(help_of(Board::rows()));
 }
 
 /// Rows that several boards have. `model` of such a board is its emulator.
@@ -102,6 +108,9 @@ constexpr ControlRow<Board> turn_row{
     "turn upper|lower REVOLUTIONS", "a wheel is turned by hand",
     [](Board& b, const ControlCommand& c) { b.model().turn_by_hand(c.first_of(1, "upper", "lower"), c.number(2)); }};
 
+/// Prints what a board has noted.
+void say_events(const std::vector<emulator::NodeEvent>& events);
+
 /// FIFO from which the emulator takes commands while it runs. An empty path means no FIFO.
 class ControlFifo {
  public:
@@ -122,13 +131,22 @@ class ControlFifo {
 /// Opens an output file of the emulator; "off" closes it. Throws std::runtime_error.
 void open_for_writing(std::ofstream& stream, const std::string& file);
 
-/// CSV of true values that the board does not show to the host, one row per ms of the board's time.
-class TruthFile {
+/// A board's time, and the CSV of true values that it does not show to the host, one row per ms of that time.
+class BoardTime {
  public:
   /// `with_trip_flags`: adds a last column, for boards that have them. An empty file name writes nothing. Throws
   /// std::runtime_error.
-  TruthFile(const std::string& file, bool with_trip_flags);
+  explicit BoardTime(bool lock_step, const std::string& truth_file = {}, bool with_trip_flags = false);
 
+  /// What the board's time begins at: 0 in lock-step, otherwise a time of this computer, ns.
+  [[nodiscard]] std::int64_t start_ns() const noexcept { return started_ns_; }
+  /// Begins anew at power-on.
+  void restart() noexcept { started_ns_ = lock_step_ ? 0 : driver::monotonic_ns(); }
+  /// Advances the board to this computer's time; in lock-step only the host advances it.
+  template <typename Board>
+  void catch_up(Board& board) {
+    if (!lock_step_) advance(board, driver::monotonic_ns() - started_ns_);
+  }
   /// Advances the board to `time_ns` and writes every row that is due in between.
   template <typename Board>
   void advance(Board& board, std::int64_t time_ns) {
@@ -146,6 +164,8 @@ class TruthFile {
   static constexpr std::int64_t period_ns = 1'000'000;
   void write(std::int64_t time_ns, const rig::PlantTruth& truth, const emulator::Outputs& out);
 
+  bool lock_step_;
+  std::int64_t started_ns_{0};
   std::ofstream stream_{};
   std::int64_t next_ns_{0};
 };

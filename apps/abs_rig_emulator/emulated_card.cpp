@@ -22,16 +22,8 @@ void wait_for(std::int64_t duration_ns) {
 }  // namespace
 
 EmulatedCard::EmulatedCard(const EmulatorOptions& options)
-    : model_(options.card),
-      faulty_(model_, options.seed),
-      lock_step_(options.lock_step),
-      started_ns_(driver::monotonic_ns()),
-      truth_(options.truth_file, true) {
+    : model_(options.card), faulty_(model_, options.seed), time_(options.lock_step, options.truth_file, true) {
   if (!options.traffic_file.empty()) open_for_writing(traffic_, options.traffic_file);
-}
-
-void EmulatedCard::catch_up() {
-  if (!lock_step_) truth_.advance(model_, driver::monotonic_ns() - started_ns_);
 }
 
 void EmulatedCard::record(char direction, std::uint64_t offset, std::uint32_t value) {
@@ -42,7 +34,7 @@ void EmulatedCard::note_change() {
   const emulator::PwmWidths& w = model_.pwm_widths();
   const std::pair now{w.drive, w.brake};
   if (std::exchange(last_widths_, now) == now) return;
-  changes_ << fmt::format("{} {} {}\n", started_ns_ + w.last_written_ns, w.drive, w.brake);
+  changes_ << fmt::format("{} {} {}\n", time_.start_ns() + w.last_written_ns, w.drive, w.brake);
 }
 
 int EmulatedCard::open(std::string_view /*name*/) { return permission_denied_ ? -EACCES : 0; }
@@ -70,7 +62,7 @@ int EmulatedCard::write(std::string_view name, std::uint64_t offset, const void*
     std::int64_t time_ns = 0;
     if (offset != 0 || size != sizeof time_ns) return -EINVAL;
     std::memcpy(&time_ns, data, sizeof time_ns);
-    truth_.advance(model_, time_ns);
+    time_.advance(model_, time_ns);
     return sizeof time_ns;
   }
   if (size != sizeof(std::uint32_t) || offset % 4 != 0 || offset >= emulator::CardModel::bytes) return -EINVAL;
@@ -91,9 +83,7 @@ std::string EmulatedCard::status() const {
 
 std::string EmulatedCard::widths() const {
   const emulator::PwmWidths& w = model_.pwm_widths();
-  const auto text = [start_ns = lock_step_ ? 0 : started_ns_](std::int64_t time_ns) {
-    return fmt::format("{} ns", start_ns + time_ns);
-  };
+  const auto text = [&](std::int64_t time_ns) { return fmt::format("{} ns", time_.start_ns() + time_ns); };
   return fmt::format("drive {}, brake {}, {}, last written at {}", w.drive, w.brake,
                      w.drive == 0 && w.brake == 0 ? "both 0 since " + text(w.zero_since_ns) : "not both 0",
                      text(w.last_written_ns));
@@ -118,22 +108,19 @@ std::span<const ControlRow<EmulatedCard>> EmulatedCard::rows() {
       turn_row<Card>,
       {"record FILE|off", "register accesses: R or W, offset, value",
        [](Card& card, const Command& c) { open_for_writing(card.traffic_, c.text(1)); }},
-      {"changes FILE|off", "each change of a PWM's width: when, ns of CLOCK_MONOTONIC, drive, brake",
+      {"changes FILE|off", "each change of a PWM's width: when, ns as in \"widths\", drive, brake",
        [](Card& card, const Command& c) { open_for_writing(card.changes_, c.text(1)); }},
-      {"widths",
-       "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in lock-step "
-       "of the card's time",
-       [](Card&, const Command&) {}},
+      {.usage = "widths",
+       .meaning = "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in "
+                  "lock-step of the card's time",
+       .answer = &Card::widths},
   }};
   return all;
 }
 
 std::string EmulatedCard::obey(std::string_view line) {
   catch_up();
-  const ControlCommand command(line);
-  if (command.empty()) return {};
-  obey_row(*this, rows(), command);
-  return command.name() == "widths" ? widths() : status();
+  return obey_line(*this, line);
 }
 
 }  // namespace abs_hil::program

@@ -34,7 +34,7 @@ class EmulatedCard final : public FileHandler {
   [[nodiscard]] bool present() const override { return present_; }
 
   /// Advances the rig to the current time; in lock-step only the client advances it.
-  void catch_up();
+  void catch_up() { time_.catch_up(model_); }
   /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
   [[nodiscard]] static std::span<const ControlRow<EmulatedCard>> rows();
@@ -50,11 +50,9 @@ class EmulatedCard final : public FileHandler {
 
   emulator::CardModel model_;
   emulator::FaultyCard faulty_;
-  bool lock_step_;
   bool present_{true};
   bool permission_denied_{false};
-  std::int64_t started_ns_{0};
-  TruthFile truth_;
+  BoardTime time_;
   std::ofstream traffic_{};
   std::ofstream changes_{};
   std::pair<std::uint32_t, std::uint32_t> last_widths_{};

@@ -5,6 +5,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -73,8 +74,7 @@ EmulatedHm2::EmulatedHm2(Hm2EmulatorOptions options)
     : options_(std::move(options)),
       board_(make_board(options_, ip_, port_)),
       link_(options_.seed),
-      started_ns_(driver::monotonic_ns()),
-      truth_(options_.truth_file, false) {
+      time_(options_.board.lock_step, options_.truth_file) {
   bind();
 }
 
@@ -90,7 +90,7 @@ void EmulatedHm2::bind() {
   }
 }
 
-void EmulatedHm2::serve() {
+bool EmulatedHm2::serve() {
   std::array<std::uint8_t, 2048> buffer{};
   for (;;) {
     sockaddr_in from{};
@@ -99,13 +99,14 @@ void EmulatedHm2::serve() {
         ::recvfrom(socket_.get(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
     if (got < 0) break;
     if (!link_.request_arrives()) continue;
-    if (!options_.board.lock_step) truth_.advance(*board_, driver::monotonic_ns() - started_ns_);
+    time_.catch_up(*board_);
     emulator::Hm2Datagram answer{board_->answer(std::span(buffer).first(static_cast<std::size_t>(got))),
                                  std::uint64_t{from.sin_addr.s_addr} << 16U | from.sin_port};
     if (!answer.bytes.empty()) link_.send(std::move(answer), driver::monotonic_ns());
     send_due();
   }
   log_events();
+  return true;
 }
 
 void EmulatedHm2::send_due() {
@@ -133,20 +134,17 @@ void EmulatedHm2::talk() {
 }
 
 void EmulatedHm2::catch_up() {
-  if (!options_.board.lock_step) truth_.advance(*board_, driver::monotonic_ns() - started_ns_);
+  time_.catch_up(*board_);
   talk();
   send_due();
   log_events();
 }
 
 void EmulatedHm2::log_events() {
-  for (const emulator::NodeEvent& event : board_->log().take_events()) {
-    say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
-  }
-  const std::int64_t start_ns = options_.board.lock_step ? 0 : started_ns_;
+  say_events(board_->log().take_events());
   for (const emulator::OutputChange& change : board_->log().take_changes()) {
     if (!changes_.is_open()) continue;
-    changes_ << fmt::format("{} {:.6f} {:.6f}\n", start_ns + change.time_ns, change.now.drive_duty,
+    changes_ << fmt::format("{} {:.6f} {:.6f}\n", time_.start_ns() + change.time_ns, change.now.drive_duty,
                             change.now.brake_duty)
              << std::flush;
   }
@@ -157,72 +155,52 @@ std::string EmulatedHm2::place() const {
 }
 
 std::string EmulatedHm2::status() const {
-  const emulator::Outputs out = board_->outputs();
-  const auto& state = board_->plant().state();
-  return fmt::format(
-      "time {:.6f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, {}, pins {}, cable {}, "
-      "writes {}",
-      static_cast<double>(board_->time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
-      state.omega2_rad_s, board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
-      board_->drives_pins() ? "driven" : "pulled high", link_.plugged() ? "in" : "out", board_->writes());
+  constexpr int microseconds = 6;
+  return fmt::format("{}, {}, pins {}, cable {}, writes {}", state_text(*board_, microseconds),
+                     board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
+                     board_->drives_pins() ? "driven" : "pulled high", link_.plugged() ? "in" : "out",
+                     board_->writes());
 }
 
-const char* EmulatedHm2::commands() {
-  return "fault NAME[=NUMBER]             ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate\n"
-         "                                stale short=BYTES garbage: of the datagrams\n"
-         "link up|down                    the Ethernet cable; the rig goes on\n"
-         "bite                            the watchdog bites now\n"
-         "power-cycle                     the board is switched off and on; the wheels turn on\n"
-         "talker read|write|drive|off     another program sends every 10 ms: reads, writes its number, drives the "
-         "brake\n"
-         "quadrature-error upper|lower    a counter sees both lines change together\n"
-         "estop on|off                    the emergency stop: cuts the drive only\n"
-         "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
-         "changes FILE | changes off      each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of "
-         "the\n"
-         "                                board's time), drive, brake\n"
-         "registers                       every register that a host has set\n"
-         "status                          duties at the power stages, speeds, watchdog, pins\n";
+void EmulatedHm2::set_talker(const std::string& what) {
+  constexpr std::array<std::string_view, 4> names{"off", "read", "write", "drive"};
+  const auto found = std::ranges::find(names, what);
+  if (found == names.end()) throw std::invalid_argument("\"" + what + "\": give read, write, drive or off");
+  talker_ = static_cast<Talker>(found - names.begin());
+}
+
+std::span<const ControlRow<EmulatedHm2>> EmulatedHm2::rows() {
+  using Hm2 = EmulatedHm2;
+  using Command = ControlCommand;
+  static constexpr std::array<ControlRow<Hm2>, 10> all{{
+      {"fault NAME[=NUMBER]",
+       "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage: of the "
+       "datagrams",
+       [](Hm2& hm2, const Command& c) { hm2.link_.set(c.text(1)); }},
+      {"link up|down", "the Ethernet cable; the rig goes on",
+       [](Hm2& hm2, const Command& c) { hm2.link_.plug(c.first_of(1, "up", "down")); }},
+      {"bite", "the watchdog bites now", [](Hm2& hm2, const Command&) { hm2.board_->bite(); }},
+      {"power-cycle", "the board is switched off and on; the wheels turn on",
+       [](Hm2& hm2, const Command&) { hm2.board_->power_cycle(); }},
+      {"talker read|write|drive|off", "another program sends every 10 ms: reads, writes its number, drives the brake",
+       [](Hm2& hm2, const Command& c) { hm2.set_talker(c.text(1)); }},
+      {"quadrature-error upper|lower", "a counter sees both lines change together",
+       [](Hm2& hm2, const Command& c) { hm2.board_->make_quadrature_error(c.first_of(1, "upper", "lower")); }},
+      estop_row<Hm2>,
+      turn_row<Hm2>,
+      {"changes FILE|off",
+       "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
+       [](Hm2& hm2, const Command& c) { open_for_writing(hm2.changes_, c.text(1)); }},
+      {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
+  }};
+  return all;
 }
 
 std::string EmulatedHm2::obey(std::string_view line) {
   catch_up();
-  const ControlCommand command(line);
-  if (command.empty()) return {};
-  emulator::UdpBoard& board = *board_;
-  const auto first_is = [&command](std::string_view a, std::string_view b) {
-    return command.text(1) == a || command.text(1) == b;
-  };
-  if (command.is("fault", 1)) {
-    link_.set(command.text(1));
-  } else if (command.is("link", 1) && first_is("up", "down")) {
-    link_.plug(command.text(1) == "up");
-  } else if (command.is("bite", 0)) {
-    board.bite();
-  } else if (command.is("power-cycle", 0)) {
-    board_->power_cycle();
-  } else if (command.is("talker", 1) && (first_is("read", "write") || first_is("drive", "off"))) {
-    const std::string& what = command.text(1);
-    talker_ = what == "read"    ? Talker::read
-              : what == "write" ? Talker::write
-              : what == "drive" ? Talker::drive
-                                : Talker::off;
-  } else if (command.is("quadrature-error", 1) && first_is("upper", "lower")) {
-    board.make_quadrature_error(command.text(1) == "upper");
-  } else if (command.is("estop", 1)) {
-    board.press_emergency_stop(command.on(1));
-  } else if (command.is("changes", 1)) {
-    changes_.close();
-    if (command.text(1) != "off") open_for_writing(changes_, command.text(1));
-  } else if (command.is("registers", 0)) {
-    return board.registers_text();
-  } else if (command.is("turn", 2)) {
-    board.turn_by_hand(command.first_of(1, "upper", "lower"), command.number(2));
-  } else if (!command.is("status", 0)) {
-    command.refuse(commands());
-  }
+  std::string answer = obey_line(*this, line);
   log_events();
-  return status();
+  return answer;
 }
 
 }  // namespace abs_hil::program

@@ -34,18 +34,19 @@ class EmulatedHm2 {
   /// Descriptor for poll().
   [[nodiscard]] int descriptor() const { return socket_.get(); }
   /// Answers all received datagrams.
-  void serve();
+  bool serve();
   /// Advances the rig to the current time, in lock-step only the host does, and sends the answers that are due.
   void catch_up();
   /// Time in ns until the next delayed answer; none: there is no such answer.
   [[nodiscard]] std::optional<std::int64_t> next_due_ns() const;
   /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
-  /// The commands of `obey`, one per line.
-  [[nodiscard]] static const char* commands();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedHm2>> rows();
+  [[nodiscard]] emulator::UdpBoard& model() noexcept { return *board_; }
   /// Current duties at the power stage and other values, as one line.
   [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string place() const;
+  [[nodiscard]] std::string registers() const { return board_->registers_text(); }
 
  private:
   enum class Talker : std::uint8_t { off, read, write, drive };
@@ -54,6 +55,7 @@ class EmulatedHm2 {
   void send_due();
   void log_events();
   void talk();
+  void set_talker(const std::string& what);
 
   Hm2EmulatorOptions options_;
   std::uint32_t ip_{0};
@@ -61,8 +63,7 @@ class EmulatedHm2 {
   std::unique_ptr<emulator::UdpBoard> board_;
   emulator::Hm2Link link_;
   driver::FileDescriptor socket_{-1};
-  std::int64_t started_ns_;
-  TruthFile truth_;
+  BoardTime time_;
   std::ofstream changes_{};
   Talker talker_{Talker::off};
   std::int64_t talks_ns_{0};

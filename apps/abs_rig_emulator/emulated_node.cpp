@@ -16,8 +16,7 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
-
-#include "driver/monotonic_time.hpp"
+#include <utility>
 
 namespace abs_hil::program {
 
@@ -122,36 +121,40 @@ const char* name_of(emulator::CanNode::State state) {
   return "unknown";
 }
 
+emulator::CanNodeOptions with_fd(emulator::CanNodeOptions options, bool can_fd) {
+  options.can_fd = can_fd;
+  return options;
+}
+
 }  // namespace
 
-EmulatedNode::EmulatedNode(const emulator::CanNodeOptions& options, std::uint64_t seed)
-    : options_(options), node_(options), faults_(seed), started_ns_(driver::monotonic_ns()) {}
+EmulatedNode::EmulatedNode(emulator::CanNodeOptions options, std::uint64_t seed, const std::string& interface)
+    : bus_(interface),
+      options_(with_fd(std::move(options), bus_.can_fd())),
+      node_(options_),
+      faults_(seed),
+      time_(options_.lock_step) {}
 
 void EmulatedNode::power_on() {
   node_ = emulator::CanNode(options_);
-  started_ns_ = driver::monotonic_ns();
-}
-
-void EmulatedNode::log_events() {
-  for (const emulator::NodeEvent& event : node_.take_events()) {
-    say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
-  }
+  time_.restart();
 }
 
 void EmulatedNode::catch_up() {
-  if (!options_.lock_step) node_.advance_to(driver::monotonic_ns() - started_ns_);
-  log_events();
+  time_.catch_up(node_);
+  say_events(node_.take_events());
 }
 
-void EmulatedNode::serve(BusSocket& bus) {
+bool EmulatedNode::serve() {
   emulator::BusFrame frame;
-  while (bus.receive(frame)) {
+  while (bus_.receive(frame)) {
     if (!faults_.hears(frame)) continue;
-    if (!options_.lock_step) node_.advance_to(driver::monotonic_ns() - started_ns_);
+    time_.catch_up(node_);
     node_.receive(frame);
-    for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus.send(answer);
+    for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus_.send(answer);
   }
-  log_events();
+  say_events(node_.take_events());
+  return true;
 }
 
 std::string EmulatedNode::status() const {
@@ -181,10 +184,7 @@ std::span<const ControlRow<EmulatedNode>> EmulatedNode::rows() {
 
 std::string EmulatedNode::obey(std::string_view line) {
   catch_up();
-  const ControlCommand command(line);
-  if (command.empty()) return {};
-  obey_row(*this, rows(), command);
-  return status();
+  return obey_line(*this, line);
 }
 
 }  // namespace abs_hil::program

@@ -43,13 +43,14 @@ class BusSocket {
 /// The CAN I/O node on its bus: time, faults, log and the control commands.
 class EmulatedNode {
  public:
-  /// Throws std::invalid_argument.
-  EmulatedNode(const emulator::CanNodeOptions& options, std::uint64_t seed);
+  /// Throws std::invalid_argument, or std::runtime_error if the bus cannot be opened, which decides about CAN FD.
+  EmulatedNode(emulator::CanNodeOptions options, std::uint64_t seed, const std::string& interface);
 
+  [[nodiscard]] int descriptor() const noexcept { return bus_.descriptor(); }
   /// Advances the rig to the current time; in lock-step only ABS_TIME advances it.
   void catch_up();
   /// Answers all received frames.
-  void serve(BusSocket& bus);
+  bool serve();
   /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
   [[nodiscard]] static std::span<const ControlRow<EmulatedNode>> rows();
@@ -58,13 +59,13 @@ class EmulatedNode {
   [[nodiscard]] std::string status() const;
 
  private:
-  void log_events();
   void power_on();
 
+  BusSocket bus_;
   emulator::CanNodeOptions options_;
   emulator::CanNode node_;
   emulator::NodeFaults faults_;
-  std::int64_t started_ns_{0};
+  BoardTime time_;
 };
 
 }  // namespace abs_hil::program

@@ -48,8 +48,7 @@ EmulatedUsb::EmulatedUsb(const UsbEmulatorOptions& options)
       device_(board_, options.identity, options.seed,
               options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
                                 : emulator::UsbipDevice::GoOnTo()),
-      started_ns_(driver::monotonic_ns()),
-      truth_(options.truth_file, false) {
+      time_(options.lock_step, options.truth_file) {
   for (const std::string& command : options.when_braking) {
     if (command == "plug")
       throw std::invalid_argument("--when-braking plug: the board is already plugged in; give another");
@@ -115,7 +114,7 @@ bool EmulatedUsb::serve() {
 }
 
 void EmulatedUsb::go_on_to(std::int64_t time_ns) {
-  truth_.advance(board_, time_ns);
+  time_.advance(board_, time_ns);
   run_commands_when_braking();
 }
 
@@ -134,7 +133,7 @@ void EmulatedUsb::run_commands_when_braking() {
 }
 
 void EmulatedUsb::catch_up() {
-  if (!options_.lock_step) go_on_to(driver::monotonic_ns() - started_ns_);
+  if (!options_.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
   std::vector<std::uint8_t> replies;
   device_.answer_late_ones(driver::monotonic_ns(), replies);
   send(replies);
@@ -169,11 +168,6 @@ std::span<const ControlRow<EmulatedUsb>> EmulatedUsb::rows() {
   return all;
 }
 
-std::string EmulatedUsb::obey(std::string_view line) {
-  const ControlCommand command(line);
-  if (command.empty()) return {};
-  obey_row(*this, rows(), command);
-  return status();
-}
+std::string EmulatedUsb::obey(std::string_view line) { return obey_line(*this, line); }
 
 }  // namespace abs_hil::program

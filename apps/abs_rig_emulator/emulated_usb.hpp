@@ -49,9 +49,8 @@ class EmulatedUsb {
   emulator::UsbBoardModel board_;
   emulator::UsbipDevice device_;
   driver::FileDescriptor host_{-1};
-  std::int64_t started_ns_;
   std::int64_t brake_since_ns_{-1};
-  TruthFile truth_;
+  BoardTime time_;
 };
 
 }  // namespace abs_hil::program

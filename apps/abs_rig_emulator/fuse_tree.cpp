@@ -177,7 +177,7 @@ FuseTree::~FuseTree() {
 
 int FuseTree::descriptor() const { return fuse_session_fd(fuse_get_session(state_->tree)); }
 
-bool FuseTree::serve_one() {
+bool FuseTree::serve() {
   fuse_session* session = fuse_get_session(state_->tree);
   const int got = fuse_session_receive_buf(session, &state_->buffer);
   if (got == -EINTR || got == -EAGAIN) return true;

@@ -50,7 +50,7 @@ class FuseTree {
   /// Descriptor for poll().
   [[nodiscard]] int descriptor() const;
   /// Answers one waiting request. False once the tree has been unmounted from outside.
-  bool serve_one();
+  bool serve();
 
   struct State;
 

@@ -183,7 +183,7 @@ void add_options(cli::Parser& parser, Arguments& a) {
   parser.set_footer(
       std::string("Control commands (--command, --control) of a card:\n") + help_of(program::EmulatedCard::rows()) +
       "of a CAN node:\n" + help_of(program::EmulatedNode::rows()) + "of a USB board:\n" +
-      help_of(program::EmulatedUsb::rows()) + "of a 7I92T or a node:\n" + program::EmulatedHm2::commands());
+      help_of(program::EmulatedUsb::rows()) + "of a 7I92T or a node:\n" + help_of(program::EmulatedHm2::rows()));
 }
 
 void read_plant(Arguments& a) {
@@ -249,46 +249,45 @@ void obey_first(const Arguments& a, Board& board) {
   for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
 }
 
-/// Serves the host, at the descriptor that `host` returns, and the control FIFO. Ends at a signal, or when `serve_host`
-/// returns that the host has gone for good.
-template <typename Board, typename Host, typename ServeHost>
-int serve_until_stopped(const Arguments& a, Board& board, const std::string& place, Host host, ServeHost serve_host) {
+/// Serves the host behind `host` and the control FIFO. Ends at a signal, or when the host has gone for good.
+template <typename Board, typename Host>
+int serve_until_stopped(const Arguments& a, Board& board, const std::string& place, Host& host) {
   program::ControlFifo control(a.control_fifo);
   program::say("ready: " + place);
   bool serving = true;
   while (serving && !stop_requested) {
-    std::array<pollfd, 2> ready{{{host(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
+    std::array<pollfd, 2> ready{{{host.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
     timespec wait = idle;
     if constexpr (requires { board.next_due_ns(); }) {
       const std::int64_t due_ns = board.next_due_ns().value_or(idle.tv_nsec);
       wait.tv_nsec = std::clamp<std::int64_t>(due_ns, 0, idle.tv_nsec);
     }
     static_cast<void>(::ppoll(ready.data(), ready.size(), &wait, nullptr));
-    if (ready[0].revents != 0) serving = serve_host();
+    if (ready[0].revents != 0) serving = host.serve();
     if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
     board.catch_up();
   }
   program::say("ended: " + board.status());
   return 0;
 }
+template <typename Board>
+int serve_board(const Arguments& a, Board&& board, const std::string& place) {
+  obey_first(a, board);
+  return serve_until_stopped(a, board, place, board);
+}
 
 int serve_node(const Arguments& a) {
-  program::BusSocket bus(a.can_interface);
-  program::EmulatedNode node({.plant = a.emulator.card.plant,
-                              .start_speed_rad_s = a.emulator.card.start_speed_rad_s,
-                              .watchdog_ms = a.watchdog_ms,
-                              .lock_step = a.emulator.lock_step,
-                              .can_fd = bus.can_fd(),
-                              .supply_min_V = a.emulator.card.supply_min_V,
-                              .temperature_max_C = static_cast<double>(a.emulator.card.temperature_max_C),
-                              .overspeed_rpm = a.emulator.card.overspeed_rpm},
-                             a.emulator.seed);
-  obey_first(a, node);
-  pin_to(a.cpu);
-  take_priority(a);
-  return serve_until_stopped(
-      a, node, "CAN node on " + a.can_interface, [&bus] { return bus.descriptor(); },
-      [&node, &bus] { return node.serve(bus), true; });
+  const emulator::CardOptions& card = a.emulator.card;
+  return serve_board(a,
+                     program::EmulatedNode({.plant = card.plant,
+                                            .start_speed_rad_s = card.start_speed_rad_s,
+                                            .watchdog_ms = a.watchdog_ms,
+                                            .lock_step = a.emulator.lock_step,
+                                            .supply_min_V = card.supply_min_V,
+                                            .temperature_max_C = static_cast<double>(card.temperature_max_C),
+                                            .overspeed_rpm = card.overspeed_rpm},
+                                           a.emulator.seed, a.can_interface),
+                     "CAN node on " + a.can_interface);
 }
 
 int serve_usb(Arguments& a) {
@@ -297,12 +296,8 @@ int serve_usb(Arguments& a) {
   a.usb.seed = a.emulator.seed;
   a.usb.lock_step = a.emulator.lock_step;
   a.usb.truth_file = a.emulator.truth_file;
-  pin_to(a.cpu);
-  take_priority(a);
   program::EmulatedUsb board(a.usb);
-  obey_first(a, board);
-  return serve_until_stopped(
-      a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(); });
+  return serve_board(a, board, board.place());
 }
 
 int serve_hm2(Arguments& a) {
@@ -318,27 +313,21 @@ int serve_hm2(Arguments& a) {
   }
   if (a.hm2.board.name.empty()) a.hm2.board.name = a.hm2.is_node ? "abs-node" : "7I92T";
   program::EmulatedHm2 board(a.hm2);
-  obey_first(a, board);
-  pin_to(a.cpu);
-  take_priority(a);
-  return serve_until_stopped(
-      a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(), true; });
+  return serve_board(a, board, board.place());
 }
 
 int serve(Arguments& a) {
   read_plant(a);
+  pin_to(a.cpu);
+  take_priority(a);
   if (!a.hm2.address.empty() || !a.node_address.empty()) return serve_hm2(a);
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
   program::prepare_mount_folder(a.pci_root);  // first: the other files are often beside it, in the same new folder
   program::EmulatedCard card(a.emulator);
   obey_first(a, card);
-  pin_to(a.cpu);
-  take_priority(a);
   program::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
-  return serve_until_stopped(
-      a, card, "card " + a.bdfs.front() + " in " + a.pci_root, [&tree] { return tree.descriptor(); },
-      [&tree] { return tree.serve_one(); });
+  return serve_until_stopped(a, card, "card " + a.bdfs.front() + " in " + a.pci_root, tree);
 }
 
 int run(int argc, char** argv) {
