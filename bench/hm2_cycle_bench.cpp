@@ -81,15 +81,15 @@ void hm2_cycle(benchmark::State& state) {
   driver.activate(driver::monotonic_ns());
   const int bare = ::socket(AF_INET, SOCK_DGRAM, 0);
   if (::connect(bare, reinterpret_cast<const sockaddr*>(&other.address()), sizeof(sockaddr_in)) != 0) std::abort();
-  const driver::hm2::CycleWire wire({.ports = 2,
-                                     .port_data = 0x1000,
-                                     .direction = 0x1100,
-                                     .bitten = 0x0D00,
-                                     .pet = 0x0E00,
-                                     .stamp_clock = 0x3300,
-                                     .count = {0x3004, 0x3000},
-                                     .control = {0x3104, 0x3100},
-                                     .pwm = {0x4000, 0x4004}});
+  const driver::hm2::CycleWire wire{.ports = 2,
+                                    .port_data = 0x1000,
+                                    .direction = 0x1100,
+                                    .bitten = 0x0D00,
+                                    .pet = 0x0E00,
+                                    .stamp_clock = 0x3300,
+                                    .count = {0x3004, 0x3000},
+                                    .control = {0x3104, 0x3100},
+                                    .pwm = {0x4000, 0x4004}};
   const driver::hm2::Packet read = wire.read(1);
   const driver::hm2::Packet write = wire.write({}, {0, 0}, 1);
   std::vector<double> cycles;

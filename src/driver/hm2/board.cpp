@@ -6,8 +6,9 @@
 #include <array>
 #include <initializer_list>
 #include <span>
+#include <tuple>
 
-#include "abs_hil/driver/io_result.hpp"
+#include "driver/board_kit.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -58,17 +59,17 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& fact) const {
-    throw Unavailable("backend rig: the board at " + place_ + ": " + fact +
-                      "; this driver does not know it, and no output was written (docs/hm2.md)");
+    driver::refuse("the board at " + place_ + ": " + fact +
+                   "; this driver does not know it, and no output was written (docs/hm2.md)");
   }
   std::vector<std::uint8_t> bytes(unsigned from_space, std::uint16_t address, unsigned units) {
     Packet packet;
     packet.read(from_space, address, units);
     std::vector<std::uint8_t> answer(packet.answer_bytes());
     if (!ask(link_, packet, answer, number_)) {
-      throw Unavailable("backend rig: the board at " + place_ +
-                        " does not answer: check its power, the cable and the address of this computer's interface "
-                        "(docs/hm2.md, \"The network\")");
+      driver::refuse("the board at " + place_ +
+                     " does not answer: check its power, the cable and the address of this computer's interface "
+                     "(docs/hm2.md, \"The network\")");
     }
     return answer;
   }
@@ -218,81 +219,63 @@ class Reader {
   Board board_{};
 };
 
-/// Finds the pins that the options name.
-class PinFinder {
- public:
-  PinFinder(const Board& board, const Hm2Options& options) : board_(board), options_(options) {}
-
-  UsedPins find() {
-    require_instance(options_.drive_pwm, board_.pwm, "drive_pwm");
-    require_instance(options_.brake_pwm, board_.pwm, "brake_pwm");
-    require_instance(options_.lower_channel, board_.counter, "lower_channel");
-    require_instance(options_.upper_channel, board_.counter, "upper_channel");
-    std::int32_t drive_pin = -1;
-    std::int32_t brake_pin = -1;
-    for (std::size_t i = 0; i < board_.pins.size(); ++i) {
-      const Pin& pin = board_.pins[i];
-      const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
-      const bool drives = is_output && pin.unit == options_.drive_pwm;
-      const bool brakes = is_output && pin.unit == options_.brake_pwm;
-      const bool counts =
-          pin.tag == tag::counter && (pin.unit == options_.lower_channel || pin.unit == options_.upper_channel);
-      if (drives || brakes || counts) word(used_.modules, i) |= bit(i);
-      if (drives) drive_pin = static_cast<std::int32_t>(i);
-      if (brakes) brake_pin = static_cast<std::int32_t>(i);
-    }
-    claim_pwm(drive_pin, options_.drive_pin, "drive_pin");
-    claim_pwm(brake_pin, options_.brake_pin, "brake_pin");
-    claim_line(options_.enable_pin, "enable_pin", used_.enable);
-    claim_line(options_.relay_pin, "relay_pin", used_.relay);
-    return used_;
-  }
-
- private:
-  [[nodiscard]] std::uint32_t& word(PortWords& words, std::size_t pin) const { return words[pin / board_.port_width]; }
-  [[nodiscard]] std::uint32_t bit(std::size_t pin) const { return 1U << (pin % board_.port_width); }
-
-  static void require_instance(std::int32_t instance, const Module& module, const char* key) {
-    if (static_cast<unsigned>(instance) < module.instances) return;
-    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance,
-                                module.instances - 1));
-  }
-  void claim(std::int32_t pin, const char* key) {
-    const auto index = static_cast<std::size_t>(pin);
-    if (index >= board_.pins.size()) {
-      throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, pin,
-                                  board_.pins.size() - 1));
-    }
-    if ((word(used_.outputs, index) & bit(index)) != 0) {
-      throw Unavailable(formatted("backend rig: I/O pin %d has two uses", pin));
-    }
-    word(used_.outputs, index) |= bit(index);
-    if (options_.active_low) word(used_.inverted, index) |= bit(index);
-  }
-  void claim_pwm(std::int32_t has, std::int32_t wanted, const char* key) {
-    if (has >= 0 && (wanted < 0 || wanted == has)) return claim(has, key);
-    throw Unavailable(
-        formatted("backend rig: driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): "
-                  "its firmware is another one; correct the key, or load G540x2",
-                  key, wanted, has));
-  }
-  void claim_line(std::int32_t pin, const char* key, PortWords& words) {
-    if (pin < 0) return;
-    claim(pin, key);
-    word(words, static_cast<std::size_t>(pin)) |= bit(static_cast<std::size_t>(pin));
-  }
-
-  const Board& board_;
-  const Hm2Options& options_;
-  UsedPins used_{};
-};
-
 }  // namespace
 
 Board read_board(Link& link, const std::string& place, std::uint32_t& number) {
   return Reader(link, place, number).read();
 }
 
-UsedPins find_pins(const Board& board, const Hm2Options& options) { return PinFinder(board, options).find(); }
+UsedPins find_pins(const Board& board, const Hm2Options& options) {
+  using std::tuple;
+  for (const auto& [key, instance, module] : {tuple("drive_pwm", options.drive_pwm, &board.pwm),
+                                              {"brake_pwm", options.brake_pwm, &board.pwm},
+                                              {"lower_channel", options.lower_channel, &board.counter},
+                                              {"upper_channel", options.upper_channel, &board.counter}}) {
+    if (static_cast<unsigned>(instance) < module->instances) continue;
+    refuse(formatted("driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance, module->instances - 1));
+  }
+  UsedPins used;
+  const auto word = [&](PortWords& words, std::size_t pin) -> std::uint32_t& { return words[pin / board.port_width]; };
+  const auto bit = [&](std::size_t pin) { return 1U << (pin % board.port_width); };
+  const auto claim = [&](const char* key, std::int32_t number) {
+    const auto pin = static_cast<std::size_t>(number);
+    if (pin >= board.pins.size()) {
+      refuse(formatted("driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, number, board.pins.size() - 1));
+    }
+    if ((word(used.outputs, pin) & bit(pin)) != 0) refuse(formatted("I/O pin %d has two uses", number));
+    word(used.outputs, pin) |= bit(pin);
+    if (options.active_low) word(used.inverted, pin) |= bit(pin);
+  };
+  std::int32_t drive_pin = -1;
+  std::int32_t brake_pin = -1;
+  for (std::size_t i = 0; i < board.pins.size(); ++i) {
+    const Pin& pin = board.pins[i];
+    const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
+    const bool drives = is_output && pin.unit == options.drive_pwm;
+    const bool brakes = is_output && pin.unit == options.brake_pwm;
+    const bool counts =
+        pin.tag == tag::counter && (pin.unit == options.lower_channel || pin.unit == options.upper_channel);
+    if (drives || brakes || counts) word(used.modules, i) |= bit(i);
+    if (drives) drive_pin = static_cast<std::int32_t>(i);
+    if (brakes) brake_pin = static_cast<std::int32_t>(i);
+  }
+  for (const auto& [key, has, wanted] :
+       {tuple("drive_pin", drive_pin, options.drive_pin), {"brake_pin", brake_pin, options.brake_pin}}) {
+    if (has < 0 || (wanted >= 0 && wanted != has)) {
+      refuse(
+          formatted("driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): its firmware is another "
+                    "one; correct the key, or load G540x2",
+                    key, wanted, has));
+    }
+    claim(key, has);
+  }
+  for (const auto& [key, pin, words] :
+       {tuple("enable_pin", options.enable_pin, &used.enable), {"relay_pin", options.relay_pin, &used.relay}}) {
+    if (pin < 0) continue;
+    claim(key, pin);
+    word(*words, static_cast<std::size_t>(pin)) |= bit(static_cast<std::size_t>(pin));
+  }
+  return used;
+}
 
 }  // namespace abs_hil::driver::hm2

@@ -116,17 +116,17 @@ std::vector<std::string> Hm2Driver::inspection() {
   lines.push_back(formatted("clocks %.0f and %.0f MHz, %u ports of %u pins", 1e-6 * board_.clock_low_Hz,
                             1e-6 * board_.clock_high_Hz, board_.ports, board_.port_width));
   lines.insert(lines.end(), board_.modules.begin(), board_.modules.end());
-  Outputs outputs;
-  if (!ask_outputs(outputs, safe_answer_ns, safe_tries)) {
+  CycleAnswer answer;
+  if (!ask_board(answer)) {
     lines.emplace_back("no answer");
     return lines;
   }
   for (unsigned port = 0; port < board_.ports; ++port) {
-    lines.push_back(formatted("port %u: outputs (DDR) 0x%05x", port, outputs.direction[port]));
+    lines.push_back(formatted("port %u: outputs (DDR) 0x%05x", port, answer.direction[port]));
   }
-  lines.push_back(formatted("watchdog: %s", (outputs.bitten & 1U) != 0 ? "has bitten, outputs off" : "armed"));
-  lines.push_back(formatted("encoder inputs: upper wheel 0x%04x, lower wheel 0x%04x", outputs.control[0] & 0xFFFFU,
-                            outputs.control[1] & 0xFFFFU));
+  lines.push_back(formatted("watchdog: %s", (answer.bitten & 1U) != 0 ? "has bitten, outputs off" : "armed"));
+  lines.push_back(formatted("encoder inputs: upper wheel 0x%04x, lower wheel 0x%04x", answer.control[0] & 0xFFFFU,
+                            answer.control[1] & 0xFFFFU));
   return lines;
 }
 

@@ -19,10 +19,7 @@ constexpr unsigned value_shift = 16;  // of a PWM's value register
 
 }  // namespace
 
-IoResult Hm2Driver::await_answer(std::int64_t sent_ns, CycleAnswer& answer, std::int64_t& received_ns) noexcept {
-  // Without a clock of its own the emulated time does not advance meanwhile.
-  const std::int64_t deadline_ns =
-      read_clock_ == nullptr ? monotonic_ns() + rig::ns_per_s : sent_ns + answer_timeout_ns_;
+bool Hm2Driver::await_answer(std::int64_t deadline_ns, CycleAnswer& answer) noexcept {
   std::array<std::uint8_t, 256> bytes{};
   constexpr int most = 64;  // a flood must not hold the cycle
   for (int i = 0; i < most; ++i) {
@@ -33,13 +30,10 @@ IoResult Hm2Driver::await_answer(std::int64_t sent_ns, CycleAnswer& answer, std:
     } else if (answer.read_number != read_number_) {
       ++counters_.stale;
     } else {
-      received_ns = clock_ns(sent_ns);
-      counters_.answers_ns += received_ns - sent_ns;
-      counters_.longest_answer_ns = std::max(counters_.longest_answer_ns, received_ns - sent_ns);
-      return {};
+      return true;
     }
   }
-  return {IoError::no_answer, addresses_.bitten, last_errno_, rig::Reason::hm2_silent};
+  return false;
 }
 
 IoResult Hm2Driver::lost_answer() noexcept {
@@ -47,8 +41,7 @@ IoResult Hm2Driver::lost_answer() noexcept {
   unanswered_ = true;
   took_other_ = false;
   bucket_.lost();
-  if (!bucket_.tripped()) return {};
-  return {IoError::no_answer, addresses_.bitten, last_errno_, rig::Reason::hm2_silent};
+  return bucket_.tripped() ? silent(wire_.bitten) : IoResult{};
 }
 
 // Each datagram of ours raises the board's count by one, unless it is lost or late. A packet that is no datagram cannot
@@ -85,9 +78,7 @@ IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
     command_ = commands_[answer.write_number % commands_.size()];
     bucket_.lost();
     // Once that has ended the run, an answer is one again: else a board that is back would stay silent to its reader.
-    if (bucket_.tripped() && fault_.ok()) {
-      return {IoError::no_answer, at::write_number, last_errno_, rig::Reason::hm2_silent};
-    }
+    if (bucket_.tripped() && fault_.ok()) return silent(at::write_number);
   } else {
     bucket_.good();
   }
@@ -101,15 +92,15 @@ IoResult Hm2Driver::judge(const CycleAnswer& answer) noexcept {
   // The first write was lost, and the board has had none in time: still the slow start before the first write.
   if (driving_ && bitten && answer.write_number == first_write_) driving_ = false;
   if (driving_ && bitten) {
-    return {IoError::read_back_mismatch, addresses_.bitten, 0, rig::Reason::hm2_watchdog_bit};
+    return {IoError::read_back_mismatch, wire_.bitten, 0, rig::Reason::hm2_watchdog_bit};
   }
   if (driving_ && !as_set) {
-    return {IoError::read_back_mismatch, addresses_.direction, 0, rig::Reason::hm2_outputs_off};
+    return {IoError::read_back_mismatch, wire_.direction, 0, rig::Reason::hm2_outputs_off};
   }
   at_rest_ = bitten || !as_set;
   for (std::size_t i = 0; i < 2; ++i) {
     if ((answer.control[i] & quadrature_error) == 0) continue;
-    return {IoError::implausible_answer, addresses_.control[i], 0, rig::Reason::hm2_quadrature_error};
+    return {IoError::implausible_answer, wire_.control[i], 0, rig::Reason::hm2_quadrature_error};
   }
   return {};
 }
@@ -149,7 +140,7 @@ IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns)
     moved[wheel] = std::bit_cast<std::int16_t>(step) * signs[wheel];
     if (!plausible_travel(0, moved[wheel], time_ns - last_.time_ns, options_.plausible_speed_rad_s,
                           options_.encoder_counts_per_rev)) {
-      return {IoError::implausible_answer, addresses_.count[wheel], 0, rig::Reason::hm2_values_implausible};
+      return {IoError::implausible_answer, wire_.count[wheel], 0, rig::Reason::hm2_values_implausible};
     }
   }
   const auto sum = [](std::int32_t a, std::int32_t b) {
@@ -181,16 +172,20 @@ IoResult Hm2Driver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   const std::int64_t sent_ns = clock_ns(now_ns);
   if (lock_step_) tell_time(emulated_ns_ + now_ns - activated_ns_);
   if (const int error = link_->send(wire_.read(++read_number_).bytes()); error != 0) last_errno_ = error;
+  // Without a clock of its own the emulated time does not advance meanwhile.
+  const std::int64_t deadline_ns =
+      read_clock_ == nullptr ? monotonic_ns() + rig::ns_per_s : sent_ns + answer_timeout_ns_;
   CycleAnswer answer;
-  std::int64_t received_ns = sent_ns;
-  IoResult result = await_answer(sent_ns, answer, received_ns);
-  if (!result.ok()) {
+  if (!await_answer(deadline_ns, answer)) {
     measurement = last_;
-    result = lost_answer();
-    return result.ok() ? result : latch(result);
+    const IoResult lost = lost_answer();
+    return lost.ok() ? lost : latch(lost);
   }
+  const std::int64_t received_ns = clock_ns(sent_ns);
+  counters_.answers_ns += received_ns - sent_ns;
+  counters_.longest_answer_ns = std::max(counters_.longest_answer_ns, received_ns - sent_ns);
   unanswered_ = false;
-  result = judge(answer);
+  IoResult result = judge(answer);
   if (result.ok()) result = take_counts(answer, time_of(answer, sent_ns, received_ns));
   if (!result.ok()) return latch(result);
   measurement = last_;

@@ -58,7 +58,7 @@ OutputGrid output_grid(const Hm2Options& options) noexcept {
           .brake_duty_max = std::min(options.brake_duty_max, largest)};
 }
 
-Packet safe_packet(const Board& board, const CycleAddresses::Pair& pwm) noexcept {
+Packet safe_packet(const Board& board, const RegisterPair& pwm) noexcept {
   Packet packet;
   write_pair(packet, pwm, {0, 0});
   packet.write32(board.pwm.address(reg::enable), 0);
@@ -94,33 +94,30 @@ void Hm2Driver::do_configure() {
   const std::uint32_t rate = pwm_rate(options_, board_);
   constexpr std::uint32_t most_rate = 65535;
   if (rate < 1 || rate > most_rate) {
-    throw Unavailable(
-        formatted("backend rig: driver.hm2.pwm_frequency_Hz = %g: with its clock of %.0f Hz the board "
-                  "makes %.1f to %.0f Hz",
-                  options_.pwm_frequency_Hz, board_.pwm.clock_Hz, board_.pwm.clock_Hz / 65536.0 / pwm_steps,
-                  board_.pwm.clock_Hz / pwm_steps));
+    refuse(formatted("driver.hm2.pwm_frequency_Hz = %g: with its clock of %.0f Hz the board makes %.1f to %.0f Hz",
+                     options_.pwm_frequency_Hz, board_.pwm.clock_Hz, board_.pwm.clock_Hz / 65536.0 / pwm_steps,
+                     board_.pwm.clock_Hz / pwm_steps));
   }
   const auto pair = [](const Module& module, unsigned of, std::int32_t first, std::int32_t second) {
-    return CycleAddresses::Pair{module.address(of, static_cast<unsigned>(first)),
-                                module.address(of, static_cast<unsigned>(second))};
+    return RegisterPair{module.address(of, static_cast<unsigned>(first)),
+                        module.address(of, static_cast<unsigned>(second))};
   };
-  addresses_ = {.ports = board_.ports,
-                .port_data = board_.port.address(reg::data),
-                .direction = board_.port.address(reg::direction),
-                .bitten = board_.watchdog.address(reg::bitten),
-                .pet = board_.watchdog.address(reg::pet),
-                .stamp_clock = board_.counter.address(reg::stamp_clock),
-                .count = pair(board_.counter, reg::count, options_.upper_channel, options_.lower_channel),
-                .control = pair(board_.counter, reg::control, options_.upper_channel, options_.lower_channel),
-                .pwm = pair(board_.pwm, reg::value, options_.drive_pwm, options_.brake_pwm)};
-  wire_ = CycleWire(addresses_);
+  wire_ = {.ports = board_.ports,
+           .port_data = board_.port.address(reg::data),
+           .direction = board_.port.address(reg::direction),
+           .bitten = board_.watchdog.address(reg::bitten),
+           .pet = board_.watchdog.address(reg::pet),
+           .stamp_clock = board_.counter.address(reg::stamp_clock),
+           .count = pair(board_.counter, reg::count, options_.upper_channel, options_.lower_channel),
+           .control = pair(board_.counter, reg::control, options_.upper_channel, options_.lower_channel),
+           .pwm = pair(board_.pwm, reg::value, options_.drive_pwm, options_.brake_pwm)};
   stamp_tick_ns_ = (stamps_at_2_MHz + 2) * static_cast<double>(rig::ns_per_s) / board_.counter.clock_Hz;
-  Outputs outputs;
-  if (!ask_outputs(outputs, safe_answer_ns, safe_tries)) throw Unavailable("backend rig: the hm2 board went silent");
-  if (!all_off(outputs.direction)) {
-    throw Unavailable("backend rig: outputs of the hm2 board at " + options_.address +
-                      " are on (its DDR is not 0): another program drives it. End that one, or make the board safe "
-                      "with abs_hil safe --set driver.kind=hm2");
+  CycleAnswer answer;
+  if (!ask_board(answer)) refuse("the hm2 board went silent");
+  if (!all_off(answer.direction)) {
+    refuse("outputs of the hm2 board at " + options_.address +
+           " are on (its DDR is not 0): another program drives it. End that one, or make the board safe with abs_hil "
+           "safe --set driver.kind=hm2");
   }
 }
 
@@ -142,90 +139,79 @@ bool Hm2Driver::all_off(const PortWords& direction) const noexcept {
   return std::ranges::all_of(of_ports(direction, board_), [](std::uint32_t bits) { return bits == 0; });
 }
 
-bool Hm2Driver::ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) noexcept {
-  Packet packet;
-  const std::size_t direction_at = packet.read(space::hostmot2, addresses_.direction, board_.ports);
-  const std::size_t bitten_at = packet.read(space::hostmot2, addresses_.bitten);
-  const auto control_at = read_pair(packet, addresses_.control);
-  const std::size_t received_at = packet.read(space::status, at::received, 2);
-  const std::size_t number_at = packet.read(space::timers, at::write_number, 2);
-  std::array<std::uint8_t, 128> answer{};
-  if (!ask(*link_, packet, answer, read_number_, wait_ns, tries)) return false;
-  for (unsigned port = 0; port < board_.ports; ++port) {
-    outputs.direction[port] = word32(answer, direction_at + std::size_t{4} * port);
+bool Hm2Driver::ask_board(CycleAnswer& answer, int tries) noexcept {
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    if (link_->send(wire_.read(++read_number_).bytes()) != 0) continue;
+    if (await_answer(monotonic_ns() + safe_answer_ns, answer)) return true;
   }
-  outputs.bitten = word32(answer, bitten_at);
-  outputs.control = {word32(answer, control_at[0]), word32(answer, control_at[1])};
-  outputs.received = {.all = word16(answer, received_at), .udp = word16(answer, received_at + 2)};
-  outputs.write_number = word32(answer, number_at);
-  return true;
+  return false;
 }
 
 // The order keeps the old PWM values, which the board holds over a bite, from the pins: direction comes last.
 Packet Hm2Driver::set_up_packet() const noexcept {
-  const auto pwm_mode = CycleAddresses::Pair{board_.pwm.address(reg::mode, static_cast<unsigned>(options_.drive_pwm)),
-                                             board_.pwm.address(reg::mode, static_cast<unsigned>(options_.brake_pwm))};
+  const auto pwm_mode = RegisterPair{board_.pwm.address(reg::mode, static_cast<unsigned>(options_.drive_pwm)),
+                                     board_.pwm.address(reg::mode, static_cast<unsigned>(options_.brake_pwm))};
   const std::uint32_t both =
       1U << static_cast<unsigned>(options_.drive_pwm) | 1U << static_cast<unsigned>(options_.brake_pwm);
   constexpr PortWords none{};
   Packet packet;
-  write_pair(packet, addresses_.pwm, {0, 0});
+  write_pair(packet, wire_.pwm, {0, 0});
   write_pair(packet, pwm_mode, {unbuffered_12_bit, unbuffered_12_bit});
   packet.write32(board_.pwm.address(reg::rate), pwm_rate(options_, board_));
   packet.write32(board_.pwm.address(reg::enable), both);
   packet.write32(board_.port.address(reg::invert), of_ports(pins_.inverted, board_));
   packet.write32(board_.port.address(reg::open_drain), of_ports(none, board_));
   packet.write32(board_.port.address(reg::alternate_source), of_ports(pins_.modules, board_));
-  packet.write32(addresses_.port_data, of_ports(none, board_));
-  write_pair(packet, addresses_.control, {count_filter, count_filter});
+  packet.write32(wire_.port_data, of_ports(none, board_));
+  write_pair(packet, wire_.control, {count_filter, count_filter});
   packet.write32(board_.counter.address(reg::stamp_divisor), stamps_at_2_MHz);
   packet.write32(board_.counter.address(reg::filter), filter_at_25_MHz);
   packet.write32(board_.watchdog.address(reg::time), watchdog_time(options_, board_));
-  packet.write32(addresses_.bitten, 0);
+  packet.write32(wire_.bitten, 0);
   packet.write_number(at::write_number, write_number_);
   return packet;
 }
 
 void Hm2Driver::put_outputs_on(Packet& packet) const noexcept {
-  packet.write32(addresses_.direction, of_ports(pins_.outputs, board_));
+  packet.write32(wire_.direction, of_ports(pins_.outputs, board_));
   packet.write_number(at::write_number, write_number_);
 }
 
 bool Hm2Driver::set_up_outputs(std::string& why) {
-  Outputs outputs;
+  CycleAnswer answer;
   const auto shown = [&] {
-    if (ask_outputs(outputs, safe_answer_ns, safe_tries)) return true;
+    if (ask_board(answer)) return true;
     why = "the board does not answer";
     return false;
   };
   if (!shown()) return false;
-  if (!all_off(outputs.direction)) {
+  if (!all_off(answer.direction)) {
     why = "its outputs are on (DDR is not 0): another program drives it";
     return false;
   }
-  const Received before = outputs.received;
+  const Received before = answer.received;
   ++write_number_;
   static_cast<void>(link_->send(set_up_packet().bytes()));
   if (!shown()) return false;
-  counts_udp_ = outputs.received.udp != before.udp;
-  if (outputs.write_number != write_number_ || outputs.bitten != 0) {
-    why = outputs.bitten != 0 ? "its watchdog bit while it was set up" : "it did not take what was written";
+  counts_udp_ = answer.received.udp != before.udp;
+  if (answer.write_number != write_number_ || answer.bitten != 0) {
+    why = answer.bitten != 0 ? "its watchdog bit while it was set up" : "it did not take what was written";
     return false;
   }
-  for (const std::uint32_t control : outputs.control) {
+  for (const std::uint32_t control : answer.control) {
     if ((control & quadrature_error) == 0) continue;
     why = "a counter reports a quadrature error that does not clear: check its encoder and cable, power the board anew";
     return false;
   }
   Packet on;
-  on.write32(addresses_.pet, 0x5A000000);
+  on.write32(wire_.pet, reload);
   ++write_number_;
   put_outputs_on(on);
   static_cast<void>(link_->send(on.bytes()));
   if (!shown()) return false;
   why = "its watchdog or another program switched them off at once, or it did not take what was written";
-  return outputs.write_number == write_number_ && outputs.bitten == 0 &&
-         std::ranges::equal(of_ports(outputs.direction, board_), of_ports(pins_.outputs, board_));
+  return answer.write_number == write_number_ && answer.bitten == 0 &&
+         std::ranges::equal(of_ports(answer.direction, board_), of_ports(pins_.outputs, board_));
 }
 
 void Hm2Driver::do_activate(std::int64_t now_ns) {
@@ -252,13 +238,12 @@ void Hm2Driver::do_activate(std::int64_t now_ns) {
     }
     send_safe();
   }
-  throw Unavailable("backend rig: the hm2 board at " + options_.address +
-                    " could not be activated; it was made safe again: " + why);
+  refuse("the hm2 board at " + options_.address + " could not be activated; it was made safe again: " + why);
 }
 
 void Hm2Driver::send_safe() noexcept {
   command_ = rig::safe_command;
-  static_cast<void>(link_->send(safe_packet(board_, addresses_.pwm).bytes()));
+  static_cast<void>(link_->send(safe_packet(board_, wire_.pwm).bytes()));
   constexpr std::int64_t bite_takes_ns = 1000;
   if (lock_step_) tell_time(told_ns_ + bite_takes_ns);
 }
@@ -272,15 +257,14 @@ void Hm2Driver::tell_time(std::int64_t time_ns) noexcept {
 
 IoResult Hm2Driver::do_make_safe() noexcept {
   if (!link_) return {IoError::disconnected};
-  Outputs outputs;
+  CycleAnswer answer;
   bool answered = false;
   for (int attempt = 0; attempt < safe_tries; ++attempt) {
     send_safe();
-    answered = ask_outputs(outputs, safe_answer_ns, 1);
-    if (answered && all_off(outputs.direction)) return {};
+    answered = ask_board(answer, 1);
+    if (answered && all_off(answer.direction)) return {};
   }
-  if (answered) return {IoError::read_back_mismatch, addresses_.direction};
-  return {IoError::no_answer, addresses_.direction, last_errno_, rig::Reason::hm2_silent};
+  return answered ? IoResult{IoError::read_back_mismatch, wire_.direction} : silent(wire_.direction);
 }
 
 IoResult Hm2Driver::do_rest() noexcept {
@@ -291,9 +275,9 @@ IoResult Hm2Driver::do_rest() noexcept {
 }
 
 bool Hm2Driver::outputs_now(rig::Command& applied) noexcept {
-  Outputs outputs;
-  if (!link_ || !ask_outputs(outputs, safe_answer_ns, safe_tries)) return false;
-  applied = all_off(outputs.direction) ? rig::safe_command : commands_[outputs.write_number % commands_.size()];
+  CycleAnswer answer;
+  if (!link_ || !ask_board(answer)) return false;
+  applied = all_off(answer.direction) ? rig::safe_command : commands_[answer.write_number % commands_.size()];
   return true;
 }
 

@@ -31,7 +31,7 @@ inline constexpr std::int64_t safe_answer_ns = 20'000'000;
 inline constexpr std::int64_t hm2_make_safe_bound_ns = safe_tries * safe_answer_ns;
 
 /// `PWM 0, enable 0, watchdog bites now`: the datagram that drops all outputs from any sender.
-[[nodiscard]] Packet safe_packet(const Board& board, const CycleAddresses::Pair& pwm) noexcept;
+[[nodiscard]] Packet safe_packet(const Board& board, const RegisterPair& pwm) noexcept;
 
 /// The rig behind a HostMot2 board over Ethernet (docs/hm2.md). Not verified on hardware.
 ///
@@ -96,20 +96,17 @@ class Hm2Driver final : public RigDriver {
 
   [[nodiscard]] Packet set_up_packet() const noexcept;
   void put_outputs_on(Packet& packet) const noexcept;
-  /// What the board says of its outputs, outside the cycle.
-  struct Outputs {
-    std::uint32_t bitten{0};
-    std::uint32_t write_number{0};
-    Received received{};
-    PortWords direction{};
-    std::array<std::uint32_t, 2> control{};
-  };
-  [[nodiscard]] bool ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) noexcept;
+  /// Takes the answer to the last read, if it comes in time.
+  [[nodiscard]] bool await_answer(std::int64_t deadline_ns, CycleAnswer& answer) noexcept;
+  /// Asks for a cycle's answer outside the cycle.
+  [[nodiscard]] bool ask_board(CycleAnswer& answer, int tries = safe_tries) noexcept;
+  [[nodiscard]] IoResult silent(std::uint32_t where) const noexcept {
+    return {IoError::no_answer, where, last_errno_, rig::Reason::hm2_silent};
+  }
   [[nodiscard]] bool all_off(const PortWords& direction) const noexcept;
   [[nodiscard]] bool set_up_outputs(std::string& why);
   /// True for an emulator that waits for its time; `emulated_ns_` becomes that.
   [[nodiscard]] bool waits_for_time();
-  IoResult await_answer(std::int64_t sent_ns, CycleAnswer& answer, std::int64_t& received_ns) noexcept;
   IoResult judge(const CycleAnswer& answer) noexcept;
   IoResult judge_talkers(const CycleAnswer& answer) noexcept;
   IoResult take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept;
@@ -135,7 +132,6 @@ class Hm2Driver final : public RigDriver {
 
   std::unique_ptr<RecordedLink> link_{};
   Board board_{};
-  CycleAddresses addresses_{};
   CycleWire wire_{};
   UsedPins pins_{};
 

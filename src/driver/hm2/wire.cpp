@@ -178,8 +178,7 @@ bool ask(Link& link, const Packet& packet, std::span<std::uint8_t> answer, std::
   return false;
 }
 
-void write_pair(Packet& packet, const CycleAddresses::Pair& address,
-                const std::array<std::uint32_t, 2>& values) noexcept {
+void write_pair(Packet& packet, const RegisterPair& address, const std::array<std::uint32_t, 2>& values) noexcept {
   const auto [a, b] = address;
   if (b == a + 4) {
     packet.write32(a, values);
@@ -191,77 +190,66 @@ void write_pair(Packet& packet, const CycleAddresses::Pair& address,
   }
 }
 
-std::array<std::size_t, 2> read_pair(Packet& packet, const CycleAddresses::Pair& address) noexcept {
-  const auto [a, b] = address;
-  if (b == a + 4 || a == b + 4) {
-    const std::size_t where = packet.read(space::hostmot2, std::min(a, b), 2);
-    return a < b ? std::array{where, where + 4} : std::array{where + 4, where};
-  }
-  const std::size_t first = packet.read(space::hostmot2, a);
-  return {first, packet.read(space::hostmot2, b)};
-}
-
 namespace {
 
-/// Where an answer has its words.
-struct Places {
-  std::size_t clock_us, levels, direction, bitten, stamp_clock;
-  std::array<std::size_t, 2> count, control;
-  std::size_t received, read_number, write_number;
-};
-
-Places put_reads(Packet& packet, const CycleAddresses& a, std::uint32_t number) noexcept {
-  Places places{};
-  places.clock_us = packet.read(space::timers, at::microseconds);
-  places.levels = packet.read(space::hostmot2, a.port_data, a.ports);
-  places.direction = packet.read(space::hostmot2, a.direction, a.ports);
-  places.bitten = packet.read(space::hostmot2, a.bitten);
-  places.stamp_clock = packet.read(space::hostmot2, a.stamp_clock);  // must come before the counts
-  places.count = read_pair(packet, a.count);
-  places.control = read_pair(packet, a.control);
-  places.received = packet.read(space::status, at::received, 2);
-  packet.write_number(at::read_number, number);
-  places.read_number = packet.read(space::timers, at::read_number, 4);
-  places.write_number = places.read_number + 4;
-  return places;
+/// The lower one of two neighbours comes first in the answer.
+void read_pair(Packet& packet, const RegisterPair& address) noexcept {
+  const auto [a, b] = address;
+  if (b == a + 4 || a == b + 4) {
+    packet.read(space::hostmot2, std::min(a, b), 2);
+  } else {
+    packet.read(space::hostmot2, a);
+    packet.read(space::hostmot2, b);
+  }
 }
 
 }  // namespace
 
-Packet CycleWire::read(std::uint32_t read_number) const noexcept {
+Packet CycleWire::read(std::uint32_t number) const noexcept {
   Packet packet;
-  put_reads(packet, addresses_, read_number);
+  packet.read(space::timers, at::microseconds);
+  packet.read(space::hostmot2, port_data, ports);
+  packet.read(space::hostmot2, direction, ports);
+  packet.read(space::hostmot2, bitten);
+  packet.read(space::hostmot2, stamp_clock);  // must come before the counts
+  read_pair(packet, count);
+  read_pair(packet, control);
+  packet.read(space::status, at::received, 2);
+  packet.write_number(at::read_number, number);
+  packet.read(space::timers, at::read_number, 4);
   return packet;
 }
 
 bool CycleWire::decode(std::span<const std::uint8_t> bytes, CycleAnswer& answer) const noexcept {
-  Packet asked;
-  const Places places = put_reads(asked, addresses_, 0);
-  if (bytes.size() != asked.answer_bytes()) return false;
-  answer.clock_us = word16(bytes, places.clock_us);
-  for (unsigned port = 0; port < addresses_.ports; ++port) {
-    answer.levels[port] = word32(bytes, places.levels + std::size_t{4} * port);
-    answer.direction[port] = word32(bytes, places.direction + std::size_t{4} * port);
-  }
-  answer.bitten = word32(bytes, places.bitten);
-  answer.stamp_clock = static_cast<std::uint16_t>(word32(bytes, places.stamp_clock));
-  for (std::size_t i = 0; i < 2; ++i) {
-    answer.count[i] = word32(bytes, places.count[i]);
-    answer.control[i] = word32(bytes, places.control[i]);
-  }
-  answer.received = {.all = word16(bytes, places.received), .udp = word16(bytes, places.received + 2)};
-  answer.read_number = word32(bytes, places.read_number);
-  answer.write_number = word32(bytes, places.write_number);
+  if (bytes.size() != read(0).answer_bytes()) return false;
+  std::size_t at = 0;
+  const auto half = [&] { return word16(bytes, std::exchange(at, at + 2)); };
+  const auto word = [&] { return word32(bytes, std::exchange(at, at + 4)); };
+  const auto pair = [&](const RegisterPair& address, std::array<std::uint32_t, 2>& values) {
+    const std::size_t first = address[0] == address[1] + 4 ? 1 : 0;
+    values[first] = word();
+    values[1 - first] = word();
+  };
+  answer.clock_us = half();
+  for (unsigned port = 0; port < ports; ++port) answer.levels[port] = word();
+  for (unsigned port = 0; port < ports; ++port) answer.direction[port] = word();
+  answer.bitten = word();
+  answer.stamp_clock = static_cast<std::uint16_t>(word());
+  pair(count, answer.count);
+  pair(control, answer.control);
+  answer.received.all = half();
+  answer.received.udp = half();
+  answer.read_number = word();
+  answer.write_number = word();
   return true;
 }
 
 Packet CycleWire::write(const PortWords& data, const std::array<std::uint32_t, 2>& pwm_values,
                         std::uint32_t write_number) const noexcept {
-  constexpr std::uint32_t reload = 0x5A000000;
   Packet packet;
-  packet.write32(addresses_.port_data, {data.data(), addresses_.ports});
-  packet.write32(addresses_.pet, reload);
-  write_pair(packet, addresses_.pwm, pwm_values);
+  packet.write32(port_data, {data.data(), ports});
+  packet.write32(pet, reload);
+  write_pair(packet, pwm, pwm_values);
   packet.write_number(at::write_number, write_number);
   return packet;
 }

@@ -135,19 +135,6 @@ class RecordedLink final : public Link {
 bool ask(Link& link, const Packet& packet, std::span<std::uint8_t> answer, std::uint32_t& number,
          std::int64_t wait_ns = 50'000'000, int tries = 3) noexcept;
 
-/// Addresses of one cycle's registers, from the board's descriptors. Of two, the upper wheel or the drive comes first.
-struct CycleAddresses {
-  using Pair = std::array<std::uint16_t, 2>;
-  unsigned ports{0};
-  std::uint16_t port_data{0};
-  std::uint16_t direction{0};
-  std::uint16_t bitten{0};
-  std::uint16_t pet{0};
-  std::uint16_t stamp_clock{0};
-  Pair count{};
-  Pair control{};
-  Pair pwm{};
-};
 inline constexpr unsigned most_ports = 8;
 using PortWords = std::array<std::uint32_t, most_ports>;
 
@@ -171,25 +158,33 @@ struct CycleAnswer {
   std::uint32_t write_number{0};
 };
 
-/// The two datagrams of a cycle: one that reads, one that writes. Real-time safe.
-class CycleWire {
- public:
-  CycleWire() = default;
-  explicit CycleWire(const CycleAddresses& addresses) noexcept : addresses_(addresses) {}
-  [[nodiscard]] Packet read(std::uint32_t read_number) const noexcept;
+/// Addresses of two registers: of the upper wheel, then the lower; of the drive, then the brake.
+using RegisterPair = std::array<std::uint16_t, 2>;
+/// One command if they stand side by side, otherwise two.
+void write_pair(Packet& packet, const RegisterPair& address, const std::array<std::uint32_t, 2>& values) noexcept;
+
+/// What a write to the watchdog's pet register must be.
+inline constexpr std::uint32_t reload = 0x5A000000;
+
+/// The two datagrams of a cycle, one that reads, one that writes, and the addresses of their registers, from the
+/// board's descriptors. Real-time safe.
+struct CycleWire {
+  unsigned ports{0};
+  std::uint16_t port_data{0};
+  std::uint16_t direction{0};
+  std::uint16_t bitten{0};
+  std::uint16_t pet{0};
+  std::uint16_t stamp_clock{0};
+  RegisterPair count{};
+  RegisterPair control{};
+  RegisterPair pwm{};
+
+  [[nodiscard]] Packet read(std::uint32_t number) const noexcept;
   /// False: the answer has another length.
   [[nodiscard]] bool decode(std::span<const std::uint8_t> bytes, CycleAnswer& answer) const noexcept;
   /// PWM values, the watchdog's pet, the write's number.
   [[nodiscard]] Packet write(const PortWords& data, const std::array<std::uint32_t, 2>& pwm_values,
                              std::uint32_t write_number) const noexcept;
-
- private:
-  CycleAddresses addresses_{};
 };
-
-/// Two registers of a module's instances: one command if they stand side by side, otherwise two.
-void write_pair(Packet& packet, const CycleAddresses::Pair& address,
-                const std::array<std::uint32_t, 2>& values) noexcept;
-[[nodiscard]] std::array<std::size_t, 2> read_pair(Packet& packet, const CycleAddresses::Pair& address) noexcept;
 
 }  // namespace abs_hil::driver::hm2

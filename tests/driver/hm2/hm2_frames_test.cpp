@@ -12,7 +12,6 @@
 using namespace abs_hil;
 using namespace abs_hil::test;
 using driver::hm2::CycleAnswer;
-using driver::hm2::CycleWire;
 using driver::hm2::Hm2Driver;
 using driver::hm2::Packet;
 
@@ -60,15 +59,15 @@ std::map<std::uint16_t, std::uint32_t> registers_of_linuxcnc() {
   return registers;
 }
 
-constexpr driver::hm2::CycleAddresses stock{.ports = 2,
-                                            .port_data = 0x1000,
-                                            .direction = 0x1100,
-                                            .bitten = 0x0D00,
-                                            .pet = 0x0E00,
-                                            .stamp_clock = 0x3300,
-                                            .count = {0x3000, 0x3004},
-                                            .control = {0x3100, 0x3104},
-                                            .pwm = {0x4000, 0x4004}};
+constexpr driver::hm2::CycleWire stock{.ports = 2,
+                                       .port_data = 0x1000,
+                                       .direction = 0x1100,
+                                       .bitten = 0x0D00,
+                                       .pet = 0x0E00,
+                                       .stamp_clock = 0x3300,
+                                       .count = {0x3000, 0x3004},
+                                       .control = {0x3100, 0x3104},
+                                       .pwm = {0x4000, 0x4004}};
 
 }  // namespace
 
@@ -92,8 +91,8 @@ TEST_CASE("The wire makes LinuxCNC's requests, byte for byte") {
       ++reads;
     } else if (frame.bytes.size() == 40 && frame.bytes[19] == 0x5A) {
       const Packet packet =
-          CycleWire(stock).write({}, {driver::hm2::word32(frame.bytes, 24), driver::hm2::word32(frame.bytes, 28)},
-                                 driver::hm2::word32(frame.bytes, 36));
+          stock.write({}, {driver::hm2::word32(frame.bytes, 24), driver::hm2::word32(frame.bytes, 28)},
+                      driver::hm2::word32(frame.bytes, 36));
       CHECK(bytes_of(packet) == frame.bytes);
       ++writes;
     }
@@ -103,7 +102,6 @@ TEST_CASE("The wire makes LinuxCNC's requests, byte for byte") {
 }
 
 TEST_CASE("Every recorded answer of a cycle is understood") {
-  const CycleWire wire(stock);
   std::size_t understood = 0;
   for (const Frame& frame : frames()) {
     if (frame.to_board || frame.bytes.size() != 42) continue;
@@ -119,7 +117,7 @@ TEST_CASE("Every recorded answer of a cycle is understood") {
       answer.insert(answer.end(), part.begin(), part.end());
     }
     CycleAnswer got;
-    REQUIRE(wire.decode(answer, got));
+    REQUIRE(stock.decode(answer, got));
     CHECK(got.clock_us == 0x1234);
     CHECK(got.direction[1] == 2);
     CHECK(got.bitten == driver::hm2::word32(frame.bytes, 8));
@@ -128,7 +126,7 @@ TEST_CASE("Every recorded answer of a cycle is understood") {
     CHECK(got.received.udp == 0x5678);
     CHECK(got.write_number == driver::hm2::word32(frame.bytes, 38));
     answer.pop_back();
-    CHECK_FALSE(wire.decode(answer, got));
+    CHECK_FALSE(stock.decode(answer, got));
     ++understood;
   }
   CHECK(understood > 100);
