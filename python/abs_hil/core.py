@@ -1,6 +1,4 @@
 """Loads the compiled module abs_hil._core and tells it where the configuration files are."""
-from __future__ import annotations
-
 import importlib
 import pathlib
 import sys

@@ -4,8 +4,6 @@
 
 `abs_hil identify` fits them beside the rig's other parameters, from any logs. This needs one run alone.
 """
-from __future__ import annotations
-
 import argparse
 import math
 import pathlib

@@ -1,6 +1,4 @@
 """The figures of merit of a braking run: the program's own table (src/analysis/braking_figures.hpp)."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,6 +1,4 @@
 """Files that are either complete or absent."""
-from __future__ import annotations
-
 import os
 import pathlib
 import tempfile

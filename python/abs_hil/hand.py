@@ -1,6 +1,4 @@
 """The plant and the controllers, stepped by hand."""
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping
 from typing import Any

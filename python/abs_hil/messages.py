@@ -6,8 +6,6 @@
 
 lcmtypes/*.lcm lists every field with its unit and range.
 """
-from __future__ import annotations
-
 import importlib
 import json
 import pkgutil

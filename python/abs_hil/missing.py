@@ -1,6 +1,4 @@
 """What to say of a Python package that is not there."""
-from __future__ import annotations
-
 import pathlib
 import sys
 import sysconfig

@@ -1,6 +1,4 @@
 """JSON and TOML from outside, without values that nest so deep that walking through them exhausts the stack."""
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

@@ -1,6 +1,4 @@
 """Messages of a running rig, over LCM."""
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

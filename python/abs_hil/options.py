@@ -1,6 +1,4 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
-from __future__ import annotations
-
 import functools
 import operator
 import os

@@ -1,6 +1,4 @@
 """Where the files of this package are that are no Python: tables, libraries for FMUs."""
-from __future__ import annotations
-
 import pathlib
 import sys
 

@@ -1,7 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
 abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab. `abs_hil report ...` starts them too."""
-from __future__ import annotations
-
 import contextlib
 import errno
 import importlib

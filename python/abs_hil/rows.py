@@ -1,6 +1,4 @@
 """Reads the rows of a run's CSV with pandas, and says file and line of whatever is no row of a run."""
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,6 +1,4 @@
 """abs_tune: searches for a controller's gains in simulation and writes them as a configuration file (docs/comparison.md)."""
-from __future__ import annotations
-
 import argparse
 import math
 import pathlib

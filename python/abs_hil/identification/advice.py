@@ -1,6 +1,4 @@
 """What to run next: by how much each shipped experiment would narrow the intervals (D-optimal design)."""
-from __future__ import annotations
-
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ Dead time d, fading k and hysteresis h change the torque that the duty u asks fo
 The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. How its readings change
 with k and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`.
 """
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 

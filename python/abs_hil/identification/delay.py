@@ -1,6 +1,4 @@
 """The delay of the board's inputs, where the logs show one."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

@@ -1,6 +1,4 @@
 """Eccentric encoder discs: which logs show them, and what all logs say together of a wheel's."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass

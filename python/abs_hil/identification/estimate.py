@@ -1,6 +1,4 @@
 """abs_hil.identify: a rig's parameters from its logs."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 

@@ -6,8 +6,6 @@ states by simulating each window with each parameter moved a little (C++, `_core
 road, brake, motor and both bearings are states of the filter: large in the first rounds, when the model is wrong;
 as large as the logs say in the last.
 """
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 

@@ -1,6 +1,4 @@
 """Which form of the plant the logs are of: by cross-validation, and by which one follows them."""
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

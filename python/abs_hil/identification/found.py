@@ -1,6 +1,4 @@
 """What identify() found: estimates with their intervals, statuses and combinations, and which logs disagree."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

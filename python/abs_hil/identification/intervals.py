@@ -1,7 +1,5 @@
 """Intervals of 95 %: by quantising the fitted motion anew with other encoder phases (parametric bootstrap) where only the
 counts' steps disturb, by the information of the filter where the rig wanders."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

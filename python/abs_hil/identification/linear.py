@@ -1,6 +1,4 @@
 """The linearised plant over the logs, and one step of the fit: sensitivities, the filter's normal equations, new states."""
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,6 +1,4 @@
 """Logs for identification: what was measured and what was sent, from run folders, event logs and plain CSV files."""
-from __future__ import annotations
-
 import dataclasses
 import gzip
 import hashlib

@@ -1,6 +1,4 @@
 """The page of an identification: fits, residuals, intervals, correlations, what to run next."""
-from __future__ import annotations
-
 import pathlib
 
 import numpy as np

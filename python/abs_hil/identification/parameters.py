@@ -1,6 +1,4 @@
 """What can be identified: one row for each parameter, and the two forms of the plant."""
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

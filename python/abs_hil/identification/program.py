@@ -1,6 +1,4 @@
 """The command line of abs_identify."""
-from __future__ import annotations
-
 import argparse
 import json
 import pathlib

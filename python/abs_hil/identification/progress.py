@@ -1,6 +1,4 @@
 """How far an identification is: lines for each stage, and on a terminal one changing line with the time left."""
-from __future__ import annotations
-
 import sys
 import time
 from typing import TextIO

@@ -1,6 +1,4 @@
 """The brake's rate limit: whether the logs show one, and where the fit of it begins."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 

@@ -1,6 +1,4 @@
 """What identification writes: identified.json, model.toml, and a run that it predicts."""
-from __future__ import annotations
-
 import datetime
 import json
 import math

@@ -7,8 +7,6 @@ With F eliminated from (1) and (2), over an interval of time,
 which is linear but for u0 and c31; these two are scanned. While the wheels are apart, each has an equation of its own.
 The tyre's parameters then fit the force that the lower wheel felt.
 """
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

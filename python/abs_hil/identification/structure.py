@@ -6,8 +6,6 @@ direction of its duty, a speed, an angle. For each such cause the plant's deriva
 follow, are one more column of the fit. Its coefficient c and standard deviation s come from the same filter, with the
 disturbances as noise and all parameters free: |c| / s is about 1 for a rig that wanders at random, whatever the cause.
 """
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

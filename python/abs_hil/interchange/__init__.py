@@ -1,2 +1,1 @@
 """Files for other tools: MCAP (PlotJuggler, Foxglove) and Parquet, from recorded and from running experiments."""
-from __future__ import annotations

@@ -1,7 +1,5 @@
 """abs_hil export-fmu: the simulated rig, or with --controller a slip controller, as an FMU for co-simulation
 (docs/interchange.md)."""
-from __future__ import annotations
-
 import argparse
 import pathlib
 import sys

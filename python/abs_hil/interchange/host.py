@@ -1,6 +1,4 @@
 """abs_python_host: a controller in Python, MODULE:CLASS, in a process of its own. abs_hil starts it (docs/interchange.md)."""
-from __future__ import annotations
-
 import importlib
 import inspect
 import os

@@ -1,6 +1,4 @@
 """Writes runs to MCAP: chunks compressed with zstd, an index, attachments, metadata."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import IO, Any
 

@@ -2,8 +2,6 @@
 
 All but the log's are flat structs of float64. Both PlotJuggler and Foxglove read these.
 """
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,4 @@
 """abs_convert: runs as files for other tools. `abs_hil convert` starts it for OUT.mcap and OUT.parquet."""
-from __future__ import annotations
-
 import argparse
 import pathlib
 import signal

@@ -1,6 +1,4 @@
 """Converts recorded runs."""
-from __future__ import annotations
-
 import json
 
 import numpy as np

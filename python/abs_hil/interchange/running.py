@@ -1,6 +1,4 @@
 """The messages of a running experiment as topics for other tools, and their recording into MCAP."""
-from __future__ import annotations
-
 import math
 import re
 import time

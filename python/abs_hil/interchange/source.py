@@ -1,6 +1,4 @@
 """What is converted: the rows of a recorded run with everything that stands beside them, and what is missing in it."""
-from __future__ import annotations
-
 import csv
 import dataclasses
 import datetime

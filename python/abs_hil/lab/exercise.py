@@ -1,6 +1,4 @@
 """Exercises of the lab: what a page says, hides and offers, from a TOML file."""
-from __future__ import annotations
-
 import pathlib
 import re
 import tomllib

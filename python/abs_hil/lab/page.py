@@ -1,6 +1,4 @@
 """The lab as one HTML file: the simulation core as WebAssembly, uPlot, and the page's own scripts."""
-from __future__ import annotations
-
 import json
 import pathlib
 from typing import Any

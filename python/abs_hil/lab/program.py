@@ -1,6 +1,4 @@
 """abs_hil lab: a page that simulates the rig and its controllers in the browser, without a server (docs/lab.md)."""
-from __future__ import annotations
-
 import argparse
 import pathlib
 import sys

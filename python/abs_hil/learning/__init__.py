@@ -3,8 +3,6 @@
     import gymnasium, abs_hil.learning
     environment = gymnasium.make("abs_hil/SlipControl-v0")
 """
-from __future__ import annotations
-
 import contextlib
 
 from .rigs import Rigs, Task

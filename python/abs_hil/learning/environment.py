@@ -1,6 +1,4 @@
 """The gymnasium environments."""
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,6 +1,4 @@
 """What `render` shows: the episode so far as a picture."""
-from __future__ import annotations
-
 import numpy as np
 
 from ..missing import how_to_install

@@ -1,6 +1,4 @@
 """The gymnasium environment over a rig in real time: one run of the program `abs_hil` an episode."""
-from __future__ import annotations
-
 import json
 import mmap
 import pathlib

@@ -1,6 +1,4 @@
 """Simulated rigs for a learner: what it observes, what it is paid, which plants it meets. Needs NumPy only."""
-from __future__ import annotations
-
 import collections
 import contextlib
 from collections.abc import Mapping

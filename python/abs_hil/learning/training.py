@@ -1,6 +1,4 @@
 """A small learner, from scratch: the cross-entropy method over a controller of nine numbers."""
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

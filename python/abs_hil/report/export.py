@@ -1,6 +1,4 @@
 """The rows of runs in other formats: CSV, JSON, MAT-files, Parquet."""
-from __future__ import annotations
-
 import importlib
 import json
 import math

@@ -1,6 +1,4 @@
 """The figures of runs over time: the time histories, the counterparts of the paper's figures 5 to 10, the signals."""
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

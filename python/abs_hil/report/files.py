@@ -1,6 +1,4 @@
 """The files of runs, except their rows: what the command line names, and the files beside each CSV."""
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,6 +1,4 @@
 """A report as one HTML page that needs no network: tables, plotly.js, and the curves as data."""
-from __future__ import annotations
-
 import base64
 import hashlib
 import importlib.util

@@ -1,6 +1,4 @@
 """The paper's comparison page: its statements beside what two runs give."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,6 +1,4 @@
 """Figures as picture files, for a text or a hand-in: SVG, PDF, PNG by matplotlib."""
-from __future__ import annotations
-
 import os
 import pathlib
 from functools import partial

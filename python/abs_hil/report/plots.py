@@ -1,6 +1,4 @@
 """Figures as data for plotly.js: one dictionary a figure, which page.js draws."""
-from __future__ import annotations
-
 import base64
 import gzip
 import html

@@ -1,6 +1,4 @@
 """The command line of abs_report."""
-from __future__ import annotations
-
 import argparse
 import pathlib
 import re

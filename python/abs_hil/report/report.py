@@ -1,6 +1,4 @@
 """A report of runs: reads them once, makes figures, tables and the page."""
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,6 +1,4 @@
 """Series of runs: groups of equal values of what was varied, their means, and the figure over them."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,6 +1,4 @@
 """What a run's rows say as a whole: phases, braking, figures of merit, changes of the simulated rig."""
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import dataclass, field

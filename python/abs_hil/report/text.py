@@ -1,6 +1,4 @@
 """Texts of a report: text from files made fit to show, and numbers as people read them."""
-from __future__ import annotations
-
 import math
 
 from ..core import _core

@@ -1,6 +1,4 @@
 """Thins long curves without losing peaks or chatter."""
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,6 +1,4 @@
 """Histograms of the cycle's timing."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

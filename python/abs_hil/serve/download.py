@@ -1,6 +1,4 @@
 """What the page shows, as a file: the rows of a run's CSV, or the same as MCAP."""
-from __future__ import annotations
-
 import csv
 import io
 import pathlib

@@ -1,6 +1,4 @@
 """From LCM's packets, live or of a log, to the history and the facts of runs."""
-from __future__ import annotations
-
 import math
 import pathlib
 import re

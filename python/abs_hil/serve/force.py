@@ -1,8 +1,6 @@
 """The tyre's force over slip, estimated while the wheel brakes: cubics through both encoders' angles over 60 ms give speed
 and deceleration in their middle, and the lower wheel's balance of torques gives the force (as src/analysis/friction_curve.cpp
 does after a run)."""
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The same messages as an MCAP file's (interchange/running.py), live, for Foxglove, Lichtblick and PlotJuggler: the protocol
 foxglove.sdk.v1 by the package foxglove-sdk, whose threads are this process's only."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

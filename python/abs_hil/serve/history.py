@@ -1,7 +1,5 @@
 """What the scope remembers, in memory that is allocated once: the newest cycles whole, and of a longer time the least and
 the greatest value of every signal in each fiftieth of a second."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,6 +1,4 @@
 """The command line of abs_serve; `abs_hil serve` starts it."""
-from __future__ import annotations
-
 import argparse
 import asyncio
 import pathlib

@@ -1,6 +1,4 @@
 """What a viewer is told of a run beside its curves: names, phases, verdicts, events, timing. Every list has a bound."""
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

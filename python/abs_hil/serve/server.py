@@ -1,6 +1,4 @@
 """The HTTP side: the page and its files, the WebSocket, downloads; and who may have them."""
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hmac

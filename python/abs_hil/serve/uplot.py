@@ -1,6 +1,4 @@
 """Where uPlot stands, which draws the charts of abs_serve and of the lab."""
-from __future__ import annotations
-
 import pathlib
 
 _FOLDER = pathlib.Path(__file__).resolve().parent

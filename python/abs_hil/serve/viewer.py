@@ -1,7 +1,5 @@
 """One viewer: a WebSocket with two cursors, one into the bins and one into the facts of the runs. It holds no queue of
 data, so a slow viewer costs no memory: what it falls behind too far is left out, counted and told."""
-from __future__ import annotations
-
 import asyncio
 import json
 import math

@@ -1,6 +1,4 @@
 """The page of a study: quantiles, curves, maps, Sobol indices."""
-from __future__ import annotations
-
 import pathlib
 
 from ..core import _core

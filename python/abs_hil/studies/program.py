@@ -1,6 +1,4 @@
 """What abs_report does with the folder of a study."""
-from __future__ import annotations
-
 import argparse
 
 from ..report.files import InputError

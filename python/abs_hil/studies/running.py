@@ -1,6 +1,4 @@
 """Runs studies in C++ threads, and single runs of them with all their rows."""
-from __future__ import annotations
-
 import json
 import os
 import pathlib

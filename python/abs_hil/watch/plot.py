@@ -1,6 +1,4 @@
 """Plots of characters: the dots of braille, 2 x 4 a cell, or one ASCII character a cell."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import groupby

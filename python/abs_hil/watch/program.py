@@ -1,6 +1,4 @@
 """abs_watch: a running experiment in this terminal, over LCM. `abs_hil watch` starts it (docs/watching.md)."""
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

@@ -1,6 +1,4 @@
 """The picture of a run as lines of text: a pure function of the view. Any size works; what does not fit is left out."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,6 +1,4 @@
 """The state of a run as far as its messages show it. Messages may be missing, and a new run may begin at any time."""
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass, field
