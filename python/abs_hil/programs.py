@@ -5,6 +5,7 @@ import errno
 import importlib
 import io
 import os
+import pathlib
 import sys
 
 #: name -> module with main(arguments) -> exit status
@@ -61,45 +62,6 @@ def _start(name: str, arguments: list[str]) -> int:
         return 0
 
 
-def report() -> None:
-    sys.exit(start('report', sys.argv[1:]))
-
-
-def tune() -> None:
-    sys.exit(start('tune', sys.argv[1:]))
-
-
-def learn() -> None:
-    sys.exit(start('learn', sys.argv[1:]))
-
-
-def identify() -> None:
-    sys.exit(start('identify', sys.argv[1:]))
-
-
-def benchmark() -> None:
-    sys.exit(start('benchmark', sys.argv[1:]))
-
-
-def convert() -> None:
-    sys.exit(start('convert', sys.argv[1:]))
-
-
-def watch() -> None:
-    sys.exit(start('watch', sys.argv[1:]))
-
-
-def export_fmu() -> None:
-    sys.exit(start('export-fmu', sys.argv[1:]))
-
-
-def serve() -> None:
-    sys.exit(start('serve', sys.argv[1:]))
-
-
-def lab() -> None:
-    sys.exit(start('lab', sys.argv[1:]))
-
-
-def python_host() -> None:
-    sys.exit(start('python_host', sys.argv[1:]))
+def command() -> None:
+    """What pip installs as abs_NAME: starts the program of that name."""
+    sys.exit(start(pathlib.Path(sys.argv[0]).stem.removeprefix('abs_'), sys.argv[1:]))

@@ -60,6 +60,12 @@ def test_bad_paths_are_named(tmp_path, name):
     assert os.listdir(tmp_path) == []
 
 
+def command(name, *words):
+    """The words that start a program as pip's commands do."""
+    script = f'import sys; sys.argv[0] = "/usr/bin/abs_{name}"; from abs_hil.programs import command; command()'
+    return [sys.executable, '-c', script, *map(str, words)]
+
+
 def test_a_changed_run_folder_is_refused_by_the_name_of_the_file(tmp_path, abs_hil_program):
     abs_hil_program('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--out', tmp_path / 'run')
     assert len(abs_hil.load(tmp_path / 'run'))
@@ -67,8 +73,8 @@ def test_a_changed_run_folder_is_refused_by_the_name_of_the_file(tmp_path, abs_h
         file.write(' ')
     with pytest.raises(ValueError, match=r'summary\.json" is not as it was recorded'):
         abs_hil.load(tmp_path / 'run')
-    report = subprocess.run([sys.executable, '-c', 'from abs_hil.programs import report; report()', str(tmp_path / 'run'),
-                             '--output', str(tmp_path / 'report.html')], capture_output=True, text=True)
+    report = subprocess.run(command('report', tmp_path / 'run', '--output', tmp_path / 'report.html'), capture_output=True,
+                            text=True)
     assert report.returncode == 2 and 'summary.json' in report.stderr and not (tmp_path / 'report.html').exists()
 
 
@@ -90,6 +96,5 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
     abs_hil_program('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--out', tmp_path / 'run')
     for words in (('report', '--help'), ('report', '--table', tmp_path / 'run'), ('report', '--csv', tmp_path / 'run')):
         with open('/dev/full', 'w') as full:
-            result = subprocess.run([sys.executable, '-c', f'from abs_hil.programs import {words[0]}; {words[0]}()',
-                                     *map(str, words[1:])], stdout=full, stderr=subprocess.PIPE, text=True)
+            result = subprocess.run(command(*words), stdout=full, stderr=subprocess.PIPE, text=True)
         assert result.returncode == 1 and 'cannot write to standard output' in result.stderr, result
