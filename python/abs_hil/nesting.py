@@ -1,12 +1,8 @@
 """JSON and TOML from outside, without values that nest so deep that walking through them exhausts the stack."""
 import json
 import re
+import tomllib
 from typing import Any
-
-try:
-    import tomllib
-except ImportError:  # Python before 3.11
-    tomllib = None  # type: ignore[assignment]
 
 #: as in src/rig/nesting.hpp
 MOST_LEVELS = 64
@@ -35,9 +31,7 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """As tomllib.loads. Raises ValueError also for what nests deeper than MOST_LEVELS, and in Python before 3.11."""
-    if tomllib is None:
-        raise ValueError('reading this TOML needs Python 3.11 or later')
+    """As tomllib.loads. Raises ValueError also for what nests deeper than MOST_LEVELS."""
     if any(name.count('.') >= _MOST_PARTS for name in _OUTSIDE_NAMES.split(text)):
         raise ValueError(f'a name has more than {_MOST_PARTS} parts')
     try:

@@ -27,6 +27,14 @@ class Rows:
     columns: dict[str, np.ndarray]
     truncated: bool
 
+    @property
+    def time_s(self) -> np.ndarray:
+        return self.columns['time_s']
+
+    @property
+    def braking(self) -> np.ndarray:
+        return self.columns['phase'] == 'brake'
+
 
 def read_rows(path: str | os.PathLike[str]) -> Rows:
     """Raises ValueError with file and line: missing columns, fields that are no numbers, decreasing time, no row."""

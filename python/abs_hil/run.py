@@ -193,21 +193,31 @@ def load(path: PathLike) -> Run:
         raise ValueError(f'"{place}" is {what} (it has no run.csv)')
     columns, signals, notes = read_csv(place / 'run.csv')
     summary: dict[str, Any] = {}
-    try:
-        summary = read_object(place / 'summary.json')
-    except FileNotFoundError:
+    if (place / 'summary.json').exists():
+        try:
+            summary = read_object(place / 'summary.json')
+        except ValueError as error:
+            notes.append(f'summary.json is not used: {error}')
+    else:
         notes.append('no summary.json: names, figures and configuration are unknown')
-    except (ValueError, OSError) as error:
-        notes.append(f'summary.json is not used: {error}')
     return Run(columns, summary, signals, notes=notes, folder=place, name=place.resolve().name)
 
 
-def read_object(path: pathlib.Path) -> dict[str, Any]:
-    """A JSON file that holds an object. Raises OSError, and ValueError with file, line and reason."""
-    if path.stat().st_size > MOST_BYTES:
-        raise ValueError(f'{path}: {path.stat().st_size} bytes are too many for this kind of file')
+def read_text(path: pathlib.Path) -> str:
+    """A small file beside the rows. Raises ValueError with file and reason."""
     try:
-        data = parse_json(path.read_bytes().decode('utf-8', 'replace'))
+        if (size := path.stat().st_size) > MOST_BYTES:
+            raise ValueError(f'{path}: {size} bytes are too many for this kind of file')
+        return path.read_bytes().decode('utf-8', 'replace')
+    except OSError as error:
+        raise ValueError(f'cannot read "{path}": {error.strerror}') from None
+
+
+def read_object(path: pathlib.Path) -> dict[str, Any]:
+    """A JSON file that holds an object. Raises ValueError with file, line and reason."""
+    text = read_text(path)
+    try:
+        data = parse_json(text)
     except ValueError as error:
         raise ValueError(f'{path}: not valid JSON: {_core.clean_text(str(error).encode())}') from None
     if not isinstance(data, dict):
@@ -241,7 +251,7 @@ def load_series(folder: PathLike) -> Series:
     index: dict[str, Any] = {}
     try:
         index = read_object(place / 'series.json')
-    except (OSError, ValueError):
+    except ValueError:
         notes.append('no readable series.json')
     return Series(runs, index, notes)
 

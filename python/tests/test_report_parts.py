@@ -8,6 +8,7 @@ import abs_hil
 from abs_hil.report import files, survey, text
 from abs_hil.report.model import axis_around
 from abs_hil.report.thin import thinned
+from abs_hil.rows import read_rows
 from abs_hil.run import COLUMNS
 
 NAN = math.nan
@@ -76,7 +77,7 @@ def changes_along(tmp_path, key, profile, truth=True):
                      .replace('nan', 'NaN'))
     (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
     run = files.RunFiles(tmp_path / 'run.csv', 'run', config={'plant.r2_m': '0.1', key: profile})
-    return survey.survey(run, survey.Rows(run.csv)).changes
+    return survey.survey(run, read_rows(run.csv)).changes
 
 
 def test_changes_over_time_stand_at_their_instants(tmp_path):
@@ -104,7 +105,7 @@ def test_unknown_changes_are_left_out(tmp_path):
 def test_survey_of_rows_gives_the_summarys_figures(tmp_path):
     run = abs_hil.simulate()
     run.to_csv(tmp_path / 'run.csv')
-    found = survey.survey(files.RunFiles(tmp_path / 'run.csv', 'run'), survey.Rows(tmp_path / 'run.csv'))
+    found = survey.survey(files.RunFiles(tmp_path / 'run.csv', 'run'), read_rows(tmp_path / 'run.csv'))
     for metric in survey.merits_shown():
         said = run.summary[metric.name]
         assert found.metrics[metric.name] == pytest.approx(said, abs=1e-9) if said is not None else True
@@ -121,7 +122,7 @@ def pulses_of(tmp_path, torque_Nm, slip_ref):
         lines.append(','.join(map(str, row.values())))
     (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
     run = files.RunFiles(tmp_path / 'run.csv', 'run')
-    return [(name, values['brake_start_s']) for name, values in survey.survey(run, survey.Rows(run.csv)).brakings]
+    return [(name, values['brake_start_s']) for name, values in survey.survey(run, read_rows(run.csv)).brakings]
 
 
 def test_a_brake_that_acts_again_after_a_release_begins_a_pulse(tmp_path):

@@ -9,11 +9,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..missing import how_to_install
-from ..rows import TEXTS
+from ..rows import TEXTS, read_rows
 from ..run import csv_bytes
-from .files import InputError, RunFiles
+from .files import RunFiles
 from .page import Unavailable
-from .survey import Rows
 
 FORMATS = ('csv', 'json', 'octave', 'parquet')
 _FIELD_CHARACTERS = 63  # of names in Octave and MATLAB
@@ -32,16 +31,16 @@ class Exporter:
 
     def _shared_columns(self) -> list[str]:
         """Columns that all runs share, in the order of the first run."""
-        names = [Rows(run.csv).names for run in self.runs]
+        names = [list(read_rows(run.csv).columns) for run in self.runs]
         return [name for name in names[0] if all(name in other for other in names)]
 
     def _tables(self) -> Iterator[tuple[RunFiles, dict[str, np.ndarray]]]:
         """Each run with its columns; phases as an array of names."""
         for run in self.runs:
-            rows = Rows(run.csv)
+            rows = read_rows(run.csv)
             for name in self._columns:
                 if name not in rows.columns:
-                    raise InputError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.names)}')
+                    raise ValueError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.columns)}')
             if rows.truncated:
                 self.notes.append(f'{run.csv}: the last row is incomplete, as after a crash, and is left out')
             yield run, {name: rows.columns[name] for name in self._columns}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..rows import Rows
 from .files import RunFiles
 from .model import (
     REFERENCE,
@@ -21,7 +22,7 @@ from .model import (
     phase_colour,
     run_style,
 )
-from .survey import JUDGED_M_S, Rows, Survey
+from .survey import JUDGED_M_S, Survey
 from .text import short_names
 from .thin import thinned
 

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import pathlib
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,23 +14,14 @@ import numpy as np
 
 from ..core import _core
 from ..nesting import parse_toml
-from ..run import MOST_BYTES, flattened, read_object, runs_in_series
+from ..run import flattened, read_object, read_text, runs_in_series
 from .text import DASH, clean, number_text
-
-try:
-    import tomllib
-except ImportError:  # Python before 3.11
-    tomllib = None  # type: ignore[assignment]
 
 NAME_CHARACTERS = 40
 MOST_DIFFERENCES = 3
 #: largest accepted bin of a histogram, 10 s
 MOST_US = 10_000_000
 PARTS = ('wake-up latency', 'read', 'control', 'write', 'whole cycle')
-
-
-class InputError(ValueError):
-    """Something that abs_report cannot use; the message names it and the fix."""
 
 
 @dataclass
@@ -101,24 +93,6 @@ class FoundRuns:
     notes: list[str] = field(default_factory=list)
 
 
-def read_bytes(path: pathlib.Path) -> bytes:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f'{path}: {path.stat().st_size} bytes are too many for this kind of file')
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f'cannot read "{path}": {error.strerror}') from None
-
-
-def read_json(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        return read_object(path)
-    except OSError as error:
-        raise InputError(f'cannot read "{path}": {error.strerror}') from None
-    except ValueError as error:
-        raise InputError(str(error)) from None
-
-
 def texts_of(values: dict[str, Any]) -> dict[str, str]:
     """Nested values as text under dotted keys."""
     return {clean(key, 120): number_text(value) if not isinstance(value, (list, type(None))) else clean(json.dumps(value))
@@ -126,25 +100,18 @@ def texts_of(values: dict[str, Any]) -> dict[str, str]:
 
 
 def read_toml(path: pathlib.Path) -> dict[str, str]:
-    if tomllib is None:
-        raise InputError(f'{path}: reading it needs Python 3.11 or later')
-    text = read_bytes(path).decode('utf-8', 'replace')
+    text = read_text(path)
     try:
         return texts_of(parse_toml(text))
-    except tomllib.TOMLDecodeError as error:
-        line = getattr(error, 'lineno', None)
-        if line is None:
-            found = str(error).partition('at line ')[2].split(',')[0]
-            line = int(found) if found.isdigit() else text.count('\n') + 1
-        raise InputError(f'{path}:{line}: {clean(error)}') from None
     except ValueError as error:
-        raise InputError(f'{path}: {clean(error)}') from None
+        line = re.search(r'at line (\d+)', str(error))
+        raise ValueError(f'{path}{":" + line[1] if line else ""}: {clean(error)}') from None
 
 
 def read_events(path: pathlib.Path) -> list[Event]:
-    text = read_bytes(path).decode('utf-8', 'replace')
+    text = read_text(path)
     if not text.startswith('time_s,event,phase,reason,value'):
-        raise InputError(f'{path}:1: the header must begin with "time_s,event,phase,reason,value"')
+        raise ValueError(f'{path}:1: the header must begin with "time_s,event,phase,reason,value"')
     lines = text.split('\n')
     events = []
     for number, line in enumerate(lines[1:], 2):
@@ -159,7 +126,7 @@ def read_events(path: pathlib.Path) -> list[Event]:
         except (IndexError, ValueError):
             if last:
                 break
-            raise InputError(f'{path}:{number}: not an event: "{clean(line, 60)}"') from None
+            raise ValueError(f'{path}:{number}: not an event: "{clean(line, 60)}"') from None
     return events
 
 
@@ -167,9 +134,9 @@ def read_histogram(path: pathlib.Path) -> Histogram:
     bins: dict[int, list[int]] = {}
     overflows = [0] * len(PARTS)
     title = '# Histogram Overflows:'
-    for number, line in enumerate(read_bytes(path).decode('utf-8', 'replace').splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         if number == 1 and not line.startswith('# abs_hil, us;'):
-            raise InputError(f'{path}:1: not a histogram of abs_hil: the file must begin with "# abs_hil, us;"')
+            raise ValueError(f'{path}:1: not a histogram of abs_hil: the file must begin with "# abs_hil, us;"')
         overflow = line.startswith(title)
         if not line or (line[0] == '#' and not overflow):
             continue
@@ -179,7 +146,7 @@ def read_histogram(path: pathlib.Path) -> Histogram:
             if len(counts) < len(PARTS) or min(fields) < 0 or (not overflow and fields[0] > MOST_US):
                 raise ValueError
         except ValueError:
-            raise InputError(f'{path}:{number}: not a line of a histogram: "{clean(line, 60)}"') from None
+            raise ValueError(f'{path}:{number}: not a line of a histogram: "{clean(line, 60)}"') from None
         if overflow:
             overflows = counts
         else:
@@ -193,42 +160,27 @@ def read_histogram(path: pathlib.Path) -> Histogram:
     return Histogram(columns, overflows)
 
 
-def _read_if_there(run: RunFiles, path: pathlib.Path, what: str, read: Callable[[pathlib.Path], None]) -> None:
-    """Reads an optional file. A broken one becomes a note, so that the run is still shown."""
-    if not path.exists():
-        run.notes.append(f'no {clean(path.name)}: {what}')
-        return
-    try:
-        read(path)
-    except InputError as error:
-        run.notes.append(f'not used: {clean(error, 400)}')
-
-
 def _read_folder(run: RunFiles, folder: pathlib.Path) -> None:
-    def summary(path: pathlib.Path) -> None:
-        run.summary = read_json(path)
+    def there(name: str, what: str, read: Callable[[pathlib.Path], Any]) -> Any:
+        """What an optional file holds, or None. A broken one becomes a note, so that the run is still shown."""
+        if not (folder / name).exists():
+            run.notes.append(f'no {name}: {what}')
+            return None
+        try:
+            return read(folder / name)
+        except ValueError as error:
+            run.notes.append(f'not used: {clean(error, 400)}')
+            return None
 
-    def config(path: pathlib.Path) -> None:
-        run.config = read_toml(path)
-
-    def environment(path: pathlib.Path) -> None:
-        run.environment = texts_of(read_json(path))
-
-    def events(path: pathlib.Path) -> None:
-        run.events = read_events(path)
-
-    def histogram(path: pathlib.Path) -> None:
-        run.histogram = read_histogram(path)
-
-    _read_if_there(run, folder / 'summary.json', 'metrics are computed from the CSV; names and result are unknown', summary)
+    run.summary = there('summary.json', 'metrics are computed from the CSV; names and result are unknown', read_object) or {}
     if isinstance(run.summary.get('config'), dict):
         run.config = texts_of(run.summary['config'])
     else:
-        _read_if_there(run, folder / 'config.toml', 'the configuration is unknown', config)
-    _read_if_there(run, folder / 'environment.json', 'kernel, build and board are unknown', environment)
-    _read_if_there(run, folder / 'events.csv', 'events are the phase changes in the CSV, without reasons', events)
+        run.config = there('config.toml', 'the configuration is unknown', read_toml) or {}
+    run.environment = texts_of(there('environment.json', 'kernel, build and board are unknown', read_object) or {})
+    run.events = there('events.csv', 'events are the phase changes in the CSV, without reasons', read_events) or []
     if run.summary.get('virtual_time') is not True:
-        _read_if_there(run, folder / 'histogram.txt', "no histograms of the cycle's timing", histogram)
+        run.histogram = there('histogram.txt', "no histograms of the cycle's timing", read_histogram)
 
 
 def _base_name(path: pathlib.Path) -> str:
@@ -239,10 +191,7 @@ def _base_name(path: pathlib.Path) -> str:
 
 def _load_run(path: pathlib.Path) -> RunFiles:
     if path.is_dir():
-        try:
-            _core.check_seal(os.fsencode(path))
-        except ValueError as error:
-            raise InputError(str(error)) from None
+        _core.check_seal(os.fsencode(path))
         run = RunFiles(path / 'run.csv', _base_name(path), path)
         _read_folder(run, path)
         return run
@@ -252,28 +201,25 @@ def _load_run(path: pathlib.Path) -> RunFiles:
 
 
 def _load_series(path: pathlib.Path, found: FoundRuns) -> None:
-    try:
-        folders, notes = runs_in_series(path)
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    folders, notes = runs_in_series(path)
     found.notes += [clean(note) for note in notes]
     found.series.append(SeriesFiles(_base_name(path), [len(found.runs) + number for number in range(len(folders))]))
     found.runs += [_load_run(folder) for folder in folders]
 
 
 def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None = None) -> FoundRuns:
-    """The runs that the command line names: CSV files, run folders, series folders. Raises InputError."""
+    """The runs that the command line names: CSV files, run folders, series folders. Raises ValueError."""
     found = FoundRuns()
     for argument in arguments:
         path = pathlib.Path(argument)
         if not path.exists():
-            raise InputError(f'"{path}" does not exist; give a run folder, a run\'s CSV file or a series folder')
+            raise ValueError(f'"{path}" does not exist; give a run folder, a run\'s CSV file or a series folder')
         if not path.is_dir() or (path / 'run.csv').exists():
             found.runs.append(_load_run(path))
         elif (path / 'series.json').exists() or any(path.glob('run-*/')):
             _load_series(path, found)
         else:
-            raise InputError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '
+            raise ValueError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '
                              'run-0001/)')
     _name_apart(found.runs)
     _label(found.runs, labels or [])
@@ -291,7 +237,7 @@ def _name_apart(runs: list[RunFiles]) -> None:
 
 def _label(runs: list[RunFiles], labels: list[str]) -> None:
     if labels and len(labels) != len(runs):
-        raise InputError(f'{len(labels)} labels for {len(runs)} runs; give one --label for each run')
+        raise ValueError(f'{len(labels)} labels for {len(runs)} runs; give one --label for each run')
     differences = _what_differs(runs)
     for run, differs in zip(runs, differences):
         unique = differs and differences.count(differs) == 1
@@ -330,5 +276,4 @@ def differing_keys(runs: list[RunFiles]) -> list[str]:
     """Configuration keys whose values differ between the runs that have a configuration."""
     configured = [run.config for run in runs if run.config]
     keys = sorted({key for config in configured for key in config})
-    return [key for key in keys
-            if len({config.get(key) for config in configured}) > 1]
+    return [key for key in keys if len({config.get(key) for config in configured}) > 1]

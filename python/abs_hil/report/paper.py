@@ -2,7 +2,7 @@
 import math
 from dataclasses import dataclass
 
-from .files import InputError, RunFiles
+from .files import RunFiles
 from .survey import Survey, merits_shown, value_of
 from .tables import Table
 from .text import DASH, shown
@@ -38,9 +38,9 @@ def _signed(value: float) -> str:
 
 
 def order_for_paper(runs: list[RunFiles], notes: list[str]) -> None:
-    """Puts the adaptive controller's run first. Raises InputError unless there are two runs."""
+    """Puts the adaptive controller's run first. Raises ValueError unless there are two runs."""
     if len(runs) != 2:
-        raise InputError(f'--paper compares two runs, adaptive and sliding-mode; give two runs: {len(runs)} '
+        raise ValueError(f'--paper compares two runs, adaptive and sliding-mode; give two runs: {len(runs)} '
                          f'{"was" if len(runs) == 1 else "were"} given')
     if runs[1].text('controller') == 'adaptive' and runs[0].text('controller') != 'adaptive':
         runs.reverse()

@@ -5,7 +5,6 @@ from functools import partial
 from typing import Any
 
 from ..files import write_whole
-from .files import InputError
 from .model import Curve, Figure, Panel, phase_colour
 
 FORMATS = ('pdf', 'png', 'svg')
@@ -98,15 +97,15 @@ def _drawn(figure: Figure) -> Any:
 
 
 def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool) -> list[pathlib.Path]:
-    """Writes the figures into `folder`, which it creates. Replaces an existing file only if asked. Raises InputError."""
+    """Writes the figures into `folder`, which it creates. Replaces an existing file only if asked. Raises ValueError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f'cannot create the folder "{folder}": {error.strerror}') from None
+        raise ValueError(f'cannot create the folder "{folder}": {error.strerror}') from None
     paths = [folder / f'{figure.id}.{kind}' for figure in figures]
     for path in paths:
         if not replace and path.is_file():
-            raise InputError(f'"{path}" exists; give another folder, or --force to replace it')
+            raise ValueError(f'"{path}" exists; give another folder, or --force to replace it')
     os.environ.setdefault('MPLBACKEND', 'agg')
     import logging
 

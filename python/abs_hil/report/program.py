@@ -10,7 +10,7 @@ from ..files import write_text, write_whole
 from .export import FORMATS as EXPORTS
 from .export import Exporter
 from .figures import Choice
-from .files import InputError, find_runs
+from .files import find_runs
 from .page import PAGE_MARK, Unavailable
 from .pictures import FORMATS as PICTURES
 from .report import Report, Request, make
@@ -67,7 +67,7 @@ def _choice(text: str) -> Choice:
     number = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
     if (found := re.fullmatch(f'({number}):({number})', text)) and float(found[1]) < float(found[2]):
         return Choice('given', (float(found[1]), float(found[2])))
-    raise InputError(f'--window {text}: give brake, run, or FROM:TO in seconds with FROM < TO')
+    raise ValueError(f'--window {text}: give brake, run, or FROM:TO in seconds with FROM < TO')
 
 
 def _say(notes: list[str]) -> None:
@@ -83,12 +83,12 @@ def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
     with open(path, 'rb') as file:
         if PAGE_MARK.encode() in file.read(_MARK_BYTES):
             return
-    raise InputError(f'"{path}" exists and is not a report of abs_report; give another --output, or --force to replace it')
+    raise ValueError(f'"{path}" exists and is not a report of abs_report; give another --output, or --force to replace it')
 
 
 def _refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
     if not replace and path.is_file():
-        raise InputError(f'"{path}" exists; give another {option}, or --force to replace it')
+        raise ValueError(f'"{path}" exists; give another {option}, or --force to replace it')
 
 
 def _export(o: argparse.Namespace, columns: list[str]) -> None:
@@ -103,7 +103,7 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
         write_whole(path, write)
     else:
         if o.export in ('octave', 'parquet') and sys.stdout.isatty():
-            raise InputError(f'--{o.export} writes a binary file: give --output FILE or redirect stdout')
+            raise ValueError(f'--{o.export} writes a binary file: give --output FILE or redirect stdout')
         exporter.write(o.export, sys.stdout.buffer)
         sys.stdout.buffer.flush()
     _say(exporter.notes)
@@ -153,10 +153,10 @@ def _report(o: argparse.Namespace) -> None:
 
 
 def _report_study(o: argparse.Namespace) -> None:
-    from ..studies import program
-    results = program.results_of(o)
+    from ..studies import page
+    results = page.results_of(o)
     if o.table:
-        table = program.quantile_table(results)
+        table = page.quantile_table(results)
         _print_rows(table.header, table.rows)
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
@@ -165,7 +165,7 @@ def _report_study(o: argparse.Namespace) -> None:
         results.to_parquet(path)
     else:
         _check_replaceable(path, o.force)
-        write_text(path, program.page_of(o, results))
+        write_text(path, page.page_of(o, results))
     print(path)
 
 
@@ -192,15 +192,15 @@ def main(arguments: list[str]) -> int:
     columns = [name for names in o.columns for name in names.split(',') if name]
     try:
         if columns and not o.export:
-            raise InputError('--columns selects columns to export: also give '
+            raise ValueError('--columns selects columns to export: also give '
                              + ', '.join(f'--{name}' for name in EXPORTS[:-1]) + f' or --{EXPORTS[-1]}')
         if o.format and not o.figures:
-            raise InputError('--format is the format of the figures: also give --figures')
+            raise ValueError('--format is the format of the figures: also give --figures')
         if o.export and (o.paper or o.figures or o.table or o.merits):
-            raise InputError('--paper, --figures, --table and --merits show runs; --csv, --json, --octave and --parquet '
+            raise ValueError('--paper, --figures, --table and --merits show runs; --csv, --json, --octave and --parquet '
                              'export rows; give one kind only')
         if o.metrics and not of_study:
-            raise InputError('--metric: only the page of a study has curves and maps of metrics')
+            raise ValueError('--metric: only the page of a study has curves and maps of metrics')
         if of_study:
             _report_study(o)
         elif o.export:

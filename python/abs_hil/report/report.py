@@ -4,13 +4,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core import _core
+from ..rows import read_rows
 from . import paper
 from .figures import Choice, Options, run_figures
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
 from .page import Contents, PaperPart, SeriesPart, page
 from .series import SeriesStudy, group_table, series_figure, series_table, study
-from .survey import Rows, Survey, survey
+from .survey import Survey, survey
 from .tables import (
     all_notes,
     differences_table,
@@ -79,7 +80,7 @@ def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
 
 
 def make(request: Request, progress: Callable[[int, int], None] = lambda done, total: None) -> Report:
-    """Reads the runs and makes the report. Raises InputError for what cannot be used."""
+    """Reads the runs and makes the report. Raises ValueError for what cannot be used."""
     found = find_runs(request.runs, request.labels)
     runs = found.runs
     if request.paper:
@@ -94,7 +95,7 @@ def make(request: Request, progress: Callable[[int, int], None] = lambda done, t
         done += 1
         progress(done, len(runs))
 
-    surveys, figures = run_figures(runs, options, lambda run: Rows(run.csv), survey, step)
+    surveys, figures = run_figures(runs, options, lambda run: read_rows(run.csv), survey, step)
     series = [SeriesPart(found_study.name, series_figure(number, found_study, runs, surveys),
                          group_table(found_study, runs, surveys), series_table(found_study, runs, surveys), False)
               for number, found_study in enumerate(studies, 1)]

@@ -1,15 +1,14 @@
 """What a run's rows say as a whole: phases, braking, figures of merit, changes of the simulated rig."""
 import math
-import os
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..core import _core
 from ..figures import FigureOfMerit, figures
-from ..rows import TEXTS, read_rows
+from ..rows import TEXTS, Rows
 from ..run import COLUMNS, signals_of
-from .files import InputError, RunFiles
+from .files import RunFiles
 from .text import significant
 
 #: car speed above which slip and its estimates are judged
@@ -54,38 +53,6 @@ class Change:
     label: str
 
 
-class Rows:
-    """A run's rows: arrays by column, and phases as numbers into `phases`."""
-
-    def __init__(self, path: os.PathLike[str] | str) -> None:
-        try:
-            rows = read_rows(path)
-        except ValueError as error:
-            raise InputError(str(error)) from None
-        self.columns, self.truncated = rows.columns, rows.truncated
-        self.names = list(self.columns)
-        # Texts as numbers into `phases`: changes are then quick to find.
-        self.phases: list[str] = []
-        self.phase = self._numbered('phase')
-        self.own_name = self._numbered('phase_name') if 'phase_name' in self.columns else None
-
-    def _numbered(self, name: str) -> np.ndarray:
-        texts = self.columns[name]
-        place: dict[str, int] = {text: number for number, text in enumerate(self.phases)}
-        numbers = np.array([place.setdefault(text, len(place)) for text in texts], dtype=np.int32)
-        self.phases = list(place)
-        return numbers
-
-    @property
-    def time_s(self) -> np.ndarray:
-        return self.columns['time_s']
-
-    @property
-    def braking(self) -> np.ndarray:
-        number = self.phases.index('brake') if 'brake' in self.phases else -1
-        return self.phase == number
-
-
 @dataclass
 class Survey:
     rows: int
@@ -113,14 +80,12 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
     found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
     found.r2_m = run.config_number('plant.r2_m', run.config_number('model.r2_m', PAPER_R2_M))
     braking = rows.braking
-    new = np.diff(rows.phase, prepend=-1) != 0
-    if rows.own_name is not None:
-        new |= np.diff(rows.own_name, prepend=-1) != 0
-    starts = np.flatnonzero(new)
+    kinds = rows.columns['phase']
+    names = rows.columns.get('phase_name', kinds)
+    starts = np.flatnonzero(np.append(True, (kinds[1:] != kinds[:-1]) | (names[1:] != names[:-1])))
     for number, start in enumerate(starts[:MOST_PHASES]):
         end = starts[number + 1] if number + 1 < len(starts) else len(time) - 1
-        kind = rows.phases[rows.phase[start]]
-        name = '' if rows.own_name is None else rows.phases[rows.own_name[start]]
+        kind, name = kinds[start], names[start]
         found.phases.append(Phase(kind, float(time[start]), float(time[end]), '' if name == kind else name))
     if len(starts) > MOST_PHASES:
         found.phases[-1].to_s = float(time[-1])
@@ -128,8 +93,8 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         places = np.flatnonzero(braking)
         found.brake_from_s = float(time[places[0]])
         found.brake_to_s = float(time[min(places[-1] + 1, len(time) - 1)])
-    found.known = {name for name in rows.names if name in TEXTS or not np.isnan(rows.columns[name]).all()}
-    found.signals = [name for name in signals_of(rows.names) if name in found.known]
+    found.known = {name for name in rows.columns if name in TEXTS or not np.isnan(rows.columns[name]).all()}
+    found.signals = [name for name in signals_of(list(rows.columns)) if name in found.known]
     end_speed_m_s = run.config_number('experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S)
 
     def figures_from(first: int, last: int) -> dict[str, float]:

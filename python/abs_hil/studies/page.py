@@ -1,4 +1,5 @@
-"""The page of a study: quantiles, curves, maps, Sobol indices."""
+"""The page that abs_report makes of a study: quantiles, curves, maps, Sobol indices."""
+import argparse
 import pathlib
 
 from ..core import _core
@@ -8,12 +9,14 @@ from ..report.page import render
 from ..report.tables import Table
 from ..report.text import DASH, rounded, significant
 from .figures import curve_names, curves, distributions, groups_of, maps, numeric_factors, title_of
-from .results import StudyResults
+from .results import StudyResults, load_study
 
 _FOLDER = pathlib.Path(__file__).parent
 WORST = 3  # runs of each metric
 #: whose curves and maps the page shows, if no metric is asked for
 SHOWN = ('stop_distance_m', 'slip_rms', 'torque_total_variation_Nm')
+#: options of abs_report that are about the rows of runs
+_OF_RUNS = ('labels', 'paper', 'figures', 'format', 'merits', 'columns')
 
 
 def quantile_table(results: StudyResults) -> Table:
@@ -91,3 +94,24 @@ def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
                   version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
                   description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
                   worst=worst_table(results, metrics), reasons=reasons_table(results), drawings=drawings, notes=notes)
+
+
+def results_of(o: argparse.Namespace) -> StudyResults:
+    """The one study of the command line. Raises ValueError."""
+    if len(o.runs) != 1:
+        raise ValueError('a study has a page of its own; give its folder alone')
+    for name in _OF_RUNS:
+        if getattr(o, name):
+            raise ValueError(f'--{name.removesuffix("s") if name == "labels" else name}: a study has no rows of single runs; '
+                             'leave it out, or record a run with `abs_hil study FILE --run K`')
+    if o.export not in (None, 'parquet'):
+        raise ValueError(f'--{o.export}: the results of a study are compressed CSV as they are; --parquet makes Parquet of them')
+    return load_study(o.runs[0])
+
+
+def page_of(o: argparse.Namespace, results: StudyResults) -> str:
+    metrics = [name for names in o.metrics for name in names.split(',')] or [name for name in SHOWN if name in results.metrics]
+    for name in metrics:
+        if name not in results.metrics:
+            raise ValueError(f'--metric {name}: the study has {", ".join(results.metrics)}')
+    return page(results, metrics, o.title)
