@@ -16,8 +16,6 @@ CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] i
 #: columns that hold texts
 TEXTS = ('phase', 'phase_name')
 MOST_SHOWN = 40
-#: lines are counted in blocks of this size, so that the count takes little memory
-BLOCK_BYTES = 1 << 24
 
 
 @dataclass
@@ -53,14 +51,16 @@ def read_rows(path: str | os.PathLike[str]) -> Rows:
         raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
                          f'{place}:1: no rows after the header: the file holds no data of the run')
     try:
-        if not _rectangular(data, first, len(names)):
-            raise ValueError
         rows = io.BytesIO(data)  # shares the bytes: a long run's rows fill the memory once
         rows.seek(first)
         types = {number: str if name in TEXTS else np.float64 for number, name in enumerate(names)}
-        frame = pandas.read_csv(rows, header=None, dtype=types, na_values=_no_number(names),
+        unknown: dict[int, list[str]] = {number: [] if name in TEXTS else ['NaN'] for number, name in enumerate(names)}
+        frame = pandas.read_csv(rows, header=None, dtype=types, na_values=unknown,
                                 keep_default_na=False, float_precision='round_trip', quoting=csv.QUOTE_NONE,
                                 skip_blank_lines=False, encoding_errors='surrogateescape')
+        # pandas refuses a line that is longer than the one before, and fills up a shorter one: then commas are missing.
+        if frame.shape[1] != len(names) or data.count(b',', first) != len(frame) * (len(names) - 1):
+            raise ValueError
         columns = {name: frame[number].to_numpy() for number, name in enumerate(names)}
     except ValueError as error:
         _refuse(place, data[first:], names)
@@ -90,30 +90,6 @@ def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f'{place}:1: the header has the column {twice} twice')
     return names, first
-
-
-def _rectangular(data: bytes, first: int, columns: int) -> bool:
-    """Whether every line from `first` on has this number of fields: pandas fills up short ones."""
-    text = np.frombuffer(data, dtype=np.uint8)[first:]
-    unended = 0  # commas after the last line's end
-    for start in range(0, text.size, BLOCK_BYTES):
-        block = text[start:start + BLOCK_BYTES]
-        ends = np.flatnonzero(block == ord('\n'))
-        commas = np.flatnonzero(block == ord(','))
-        before = np.searchsorted(commas, ends)
-        counts = np.diff(before, prepend=0)
-        if ends.size == 0:
-            unended += commas.size
-            continue
-        counts[0] += unended
-        if (counts != columns - 1).any():
-            return False
-        unended = commas.size - int(before[-1])
-    return True
-
-
-def _no_number(names: list[str]) -> dict[int, list[str]]:
-    return {number: [] if name in TEXTS else ['NaN'] for number, name in enumerate(names)}
 
 
 def _cleaned(texts: np.ndarray) -> np.ndarray:
