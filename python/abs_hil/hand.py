@@ -14,7 +14,9 @@ SlipOutput = _core.SlipOutput
 class _Kept:
     """A C++ object that can be copied and pickled: made again with its options, then it takes the state over."""
 
-    _given: dict[str, Any]
+    def _begin(self, given: dict[str, Any]) -> None:
+        super().__init__(given)  # type: ignore[call-arg]
+        self._given = given
 
     def copy(self) -> Any:
         """The same with all of its state."""
@@ -58,10 +60,6 @@ class Plant(_Kept, _core.Plant):  # type: ignore[misc]
     def __init__(self, plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = None) -> None:
         self._begin(options(plant=plant, set=set))
 
-    def _begin(self, given: dict[str, Any]) -> None:
-        _core.Plant.__init__(self, given)
-        self._given = given
-
 
 class Controller(_Kept, _core.Controller):  # type: ignore[misc]
     """A slip controller of the program, stepped by hand.
@@ -77,19 +75,11 @@ class Controller(_Kept, _core.Controller):  # type: ignore[misc]
                  set: Mapping[str, Value] | None = None) -> None:
         self._begin(options(controller=name, plant=plant, set=set))
 
-    def _begin(self, given: dict[str, Any]) -> None:
-        _core.Controller.__init__(self, given)
-        self._given = given
-
     def __repr__(self) -> str:
         return f'<abs_hil.Controller {self.name}>'
 
 
-def _describe(type_: Any, text: str) -> None:
-    type_.__doc__ = text
-
-
-_describe(SlipInput, """What a slip controller gets in one cycle, SI units (include/abs_hil/control/slip_controller.hpp).
+SlipInput.__doc__ = """What a slip controller gets in one cycle, SI units (include/abs_hil/control/slip_controller.hpp).
 
 dt_s: time since the previous step, > 0; 0 in the first step. omega1_rad_s, omega2_rad_s: estimated wheel speeds.
 slip, slip_ref: estimated slip and its reference. brake_torque_Nm: torque estimated to act now; mean_brake_torque_Nm: its
@@ -97,9 +87,9 @@ mean over the past interval; max_brake_torque_Nm: the largest that the actuator 
 estimated accelerations. upper_travel_rad, lower_travel_rad: angles over the past interval, NaN if unknown.
 sent_brake_torque_Nm: static torque that was sent in the previous cycle; unsent_torque_Nm: what was missing in it of the
 controller's previous output; while it is not 0, an integral that drives the output further out must stand.
-""")
-_describe(SlipOutput, """What a slip controller returns: brake_torque_Nm, the static torque b(u); NaN or infinity end the run.
+"""
+SlipOutput.__doc__ = """What a slip controller returns: brake_torque_Nm, the static torque b(u); NaN or infinity end the run.
 
 slip_velocity_error_m_s, theta_est_N, slip_ref: NaN if the controller does not give them. signals: at most 8 values, in the
 order of the controller's signals.
-""")
+"""

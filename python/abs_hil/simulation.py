@@ -1,10 +1,11 @@
 """Runs of the simulated rig in virtual time: one with all its rows, or many with their figures of merit."""
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -160,7 +161,7 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
     pairs = [(number, index if drawn else None) for number in range(len(jobs)) for index in range(repeat)]
     if vary is None:
         vary = STANDARD_VARIATION if repeat > 1 else 'none'
-    with _Progress(progress, len(pairs)) as report:
+    with progress_shown(progress) as report:
         found = _core.simulate_many(given, pairs, vary, vary_seed, threads, report, laws)
     errors = found.pop('error')
     if not keep_going:
@@ -199,29 +200,18 @@ def _grid(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     return jobs
 
 
-class _Progress:
-    """Calls the user's function, or shows a progress bar."""
-
-    def __init__(self, wanted: bool | Callable[[int, int], None], total: int) -> None:
-        self._wanted = wanted
-        self._total = total
-        self._bar: Any = None
-
-    def __enter__(self) -> Callable[[int, int], None] | None:
-        if callable(self._wanted):
-            return self._wanted
-        if not self._wanted:
-            return None
-        import tqdm
-        self._bar = tqdm.tqdm(total=self._total, unit=' runs', file=sys.stderr, leave=False)
-        return self._show
-
-    def _show(self, done: int, total: int) -> None:
-        self._bar.update(done - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
+@contextlib.contextmanager
+def progress_shown(wanted: bool | Callable[[int, int], None]) -> Iterator[Callable[[int, int], None] | None]:
+    """What to call with (done, all): the user's function, one that shows a bar on stderr, or None."""
+    if callable(wanted) or not wanted:
+        yield wanted if callable(wanted) else None
+        return
+    import tqdm
+    with tqdm.tqdm(unit=' runs', file=sys.stderr, leave=False, delay=0.2) as bar:
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+        yield show
 
 
 def controllers() -> dict[str, str]:

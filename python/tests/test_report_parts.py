@@ -6,8 +6,7 @@ import pytest
 
 import abs_hil
 from abs_hil.report import files, survey, text
-from abs_hil.report.model import axis_around
-from abs_hil.report.thin import thinned
+from abs_hil.report.model import axis_around, thinned
 from abs_hil.rows import read_rows
 from abs_hil.run import COLUMNS
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..rows import Rows
+from ..rows import Rows, read_rows
 from .files import RunFiles
 from .model import (
     REFERENCE,
@@ -21,10 +21,10 @@ from .model import (
     axis_around,
     phase_colour,
     run_style,
+    thinned,
 )
-from .survey import JUDGED_M_S, Survey
+from .survey import JUDGED_M_S, Survey, survey
 from .text import short_names
-from .thin import thinned
 
 BESIDE_BRAKE_S = 0.2
 #: more than two points per pixel are invisible; with many curves fewer are enough
@@ -362,22 +362,23 @@ class FigureMaker:
         return panel
 
 
-def run_figures(runs: list[RunFiles], options: Options, read: Callable[[RunFiles], Rows],
-                survey: Callable[[RunFiles, Rows], Survey], progress: Callable[[], None]) -> tuple[list[Survey], list[Figure]]:
+def run_figures(runs: list[RunFiles], options: Options,
+                progress: Callable[[int, int], None] | None) -> tuple[list[Survey], list[Figure]]:
     """The surveys and figures of all runs. Each CSV is read once, and again only if some runs do not brake."""
     surveys, windows, profiles = [], [], []
     stretches = stretches_for(len(runs))
-    for run in runs:
-        rows = read(run)
+    for number, run in enumerate(runs, 1):
+        rows = read_rows(run.csv)
         found = survey(run, rows)
         surveys.append(found)
         windows.append(window_of(found, options.choice, found.brakes))
         profiles.append(profiles_of(rows, found, windows[-1], stretches))
-        progress()
+        if progress is not None:
+            progress(number, len(runs))
     braking = options.choice.kind == 'brake' and all(found.brakes for found in surveys)
     if options.choice.kind == 'brake' and not braking:
         for number, found in enumerate(surveys):
             if found.brakes:
                 windows[number] = window_of(found, options.choice, False)
-                profiles[number] = profiles_of(read(runs[number]), found, windows[number], stretches)
+                profiles[number] = profiles_of(read_rows(runs[number].csv), found, windows[number], stretches)
     return surveys, FigureMaker(runs, surveys, windows, profiles, options, braking).figures()

@@ -3,10 +3,10 @@ import argparse
 import pathlib
 import re
 import sys
-from typing import Any
 
 from ..core import _core
 from ..files import write_text, write_whole
+from ..simulation import progress_shown
 from .export import FORMATS as EXPORTS
 from .export import Exporter
 from .figures import Choice
@@ -19,8 +19,6 @@ from .text import clean
 
 BAD_INPUT, UNAVAILABLE = 2, 3
 MOST_NOTES = 10
-#: fewer runs are read before anybody could look at a bar
-LEAST_BAR = 5
 _MARK_BYTES = 4096
 
 
@@ -133,7 +131,8 @@ def _report(o: argparse.Namespace) -> None:
         _check_replaceable(path, o.force)
     if o.merits:
         _refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
-    made = make(request, _Bar())
+    with progress_shown(sys.stderr.isatty()) as progress:
+        made = make(request, progress)
     if o.merits:
         frame = merits(made.runs, made.surveys)
         write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))
@@ -167,23 +166,6 @@ def _report_study(o: argparse.Namespace) -> None:
         _check_replaceable(path, o.force)
         write_text(path, page.page_of(o, results))
     print(path)
-
-
-class _Bar:
-    """A progress bar on a terminal while many runs are read."""
-
-    def __init__(self) -> None:
-        self._bar: Any = None
-
-    def __call__(self, done: int, total: int) -> None:
-        if total < LEAST_BAR or not sys.stderr.isatty():
-            return
-        if self._bar is None:
-            import tqdm
-            self._bar = tqdm.tqdm(total=total, unit=' runs', file=sys.stderr, leave=False)
-        self._bar.update(done - self._bar.n)
-        if done == total:
-            self._bar.close()
 
 
 def main(arguments: list[str]) -> int:

@@ -4,14 +4,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core import _core
-from ..rows import read_rows
 from . import paper
 from .figures import Choice, Options, run_figures
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
 from .page import Contents, PaperPart, SeriesPart, page
 from .series import SeriesStudy, group_table, series_figure, series_table, study
-from .survey import Survey, survey
+from .survey import Survey
 from .tables import (
     all_notes,
     differences_table,
@@ -79,7 +78,7 @@ def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
             options.groups[run] = number
 
 
-def make(request: Request, progress: Callable[[int, int], None] = lambda done, total: None) -> Report:
+def make(request: Request, progress: Callable[[int, int], None] | None = None) -> Report:
     """Reads the runs and makes the report. Raises ValueError for what cannot be used."""
     found = find_runs(request.runs, request.labels)
     runs = found.runs
@@ -88,14 +87,7 @@ def make(request: Request, progress: Callable[[int, int], None] = lambda done, t
     studies = [study(series, runs) for series in found.series]
     options = Options(request.choice, request.paper)
     _groups(studies, len(runs), options)
-    done = 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        progress(done, len(runs))
-
-    surveys, figures = run_figures(runs, options, lambda run: read_rows(run.csv), survey, step)
+    surveys, figures = run_figures(runs, options, progress)
     series = [SeriesPart(found_study.name, series_figure(number, found_study, runs, surveys),
                          group_table(found_study, runs, surveys), series_table(found_study, runs, surveys), False)
               for number, found_study in enumerate(studies, 1)]

@@ -1,5 +1,6 @@
 """Texts of a report: text from files made fit to show, and numbers as people read them."""
 import math
+import os
 
 from ..core import _core
 
@@ -25,18 +26,11 @@ def short_names(names: list[str], most: int) -> list[str]:
     for group in alike.values():
         if len(group) == 1:
             continue
-        begin = min(_common(names[group[0]], names[number]) for number in group)
+        alike_names = [names[number] for number in group]
+        begin = max(0, min(len(os.path.commonprefix(alike_names)), min(map(len, alike_names)) - 2))
         for number in group:
             shorts[number] = '…' + clean(names[number][begin:], most - 1)
     return shorts
-
-
-def _common(a: str, b: str) -> int:
-    left = 2
-    n = 0
-    while n + left < min(len(a), len(b)) and a[n] == b[n]:
-        n += 1
-    return n
 
 
 def shown(value: float | None, decimals: int) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import _core
 from ..run import Run
-from ..simulation import _Progress, run_of
+from ..simulation import progress_shown, run_of
 from .results import StudyResults, load_study
 
 StudyLike = Union[str, 'os.PathLike[str]', Mapping[str, Any]]
@@ -36,7 +36,7 @@ def study(study: StudyLike, out: str | os.PathLike[str] | None = None, *, thread
         raise ValueError(f'threads {threads}: give a number in [0, 1024]')
     with ExitStack() as scratch:
         folder = os.fspath(out) if out is not None else os.path.join(scratch.enter_context(tempfile.TemporaryDirectory()), 'study')
-        with _file_of(study) as (file, name), _Bar(progress) as report:
+        with _file_of(study) as (file, name), progress_shown(progress) as report:
             _core.run_study(str(file), name, folder, 1, 1, threads, report)
         results = load_study(folder)
         weakref.finalize(results, scratch.pop_all().close)
@@ -51,29 +51,6 @@ def simulate_run(study: StudyLike, run: int) -> Run:
         raise ValueError(f'run {run}: give a number of at least 0')
     with _file_of(study) as (file, _):
         return run_of(*_core.simulate_run(str(file), int(run)))
-
-
-class _Bar:
-    """The progress of simulate_many, for a number of runs that is known only later."""
-
-    def __init__(self, wanted: bool | Callable[[int, int], None]) -> None:
-        self._wanted = wanted
-        self._progress: _Progress | None = None
-        self._show: Callable[[int, int], None] | None = None
-
-    def __enter__(self) -> Callable[[int, int], None] | None:
-        return self._report if self._wanted else None
-
-    def _report(self, done: int, total: int) -> None:
-        if self._progress is None:
-            self._progress = _Progress(self._wanted, total)
-            self._show = self._progress.__enter__()
-        if self._show is not None:
-            self._show(done, total)
-
-    def __exit__(self, *details: object) -> None:
-        if self._progress is not None:
-            self._progress.__exit__(*details)
 
 
 @contextmanager
