@@ -14,9 +14,8 @@ import pytest
 from conftest import ABS_HIL
 
 import abs_hil
-from abs_hil.interchange import program, recorded, running, source
-from abs_hil.interchange.mcap_file import McapFile
-from abs_hil.interchange.messages import field_names
+from abs_hil.interchange import program, recorded, running
+from abs_hil.interchange.messages import McapFile, field_names
 from abs_hil.run import COLUMNS
 
 pytest.importorskip('mcap')
@@ -164,7 +163,7 @@ def test_lost_messages_are_counted(folder, tmp_path, capsys):
 def test_killed_conversion_leaves_no_file(folder, tmp_path):
     """Killed at several places, the conversion leaves the old file or none."""
     out = tmp_path / 'run.mcap'
-    script = ('import os, signal, sys, abs_hil.interchange.mcap_file as m\n'
+    script = ('import os, signal, sys, abs_hil.interchange.messages as m\n'
               'from abs_hil.interchange import program\n'
               'calls = 0\n'
               'write = m.McapFile.{method}\n'
@@ -263,5 +262,5 @@ def test_source_of_an_old_csv_is_refused(folder, tmp_path):
     place = rows[0].index('upper_counts')
     (tmp_path / 'old.csv').write_text('\n'.join(','.join(row[:place]) for row in rows[:50]) + '\n')
     with pytest.raises(ValueError, match='upper_counts'):
-        source.read(str(tmp_path / 'old.csv'))
+        recorded.read(str(tmp_path / 'old.csv'))
     assert recorded.CYCLE_TOPIC == '/abs_hil/cycle' and pathlib.Path(folder).exists()

@@ -183,8 +183,8 @@ def tables_of_python(copy, number):
             'print(abs_hil.figures()["made_up_s"].heading)\n'
             'log = abs_hil.load(sys.argv[1])\n'
             'print(log["made_up_Nm"].max() > 1.0, list(log.signals)[:1])\n'
-            'from abs_hil.interchange import recorded, source\n'
-            'recorded.to_mcap(source.read(sys.argv[1]), sys.argv[2])\n')
+            'from abs_hil.interchange import recorded\n'
+            'recorded.to_mcap(recorded.read(sys.argv[1]), sys.argv[2])\n')
     environment = {**copy.environment, 'PYTHONPATH': str(copy.build / 'share' / 'abs_hil' / 'python')}
     mcap = copy.build / 'run.mcap'
     own = copy.root / 'build' / 'python' / 'bin' / 'python'  # it has the modules that the package needs

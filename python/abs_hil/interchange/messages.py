@@ -1,10 +1,11 @@
-"""ROS 2 messages of runs: their definitions, and their bytes in CDR (little endian).
+"""ROS 2 messages of runs: their definitions, their bytes in CDR (little endian), and MCAP files of them.
 
 All but the log's are flat structs of float64. Both PlotJuggler and Foxglove read these.
 """
 import re
 import struct
 from collections.abc import Iterable, Sequence
+from typing import IO, Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
+CHUNK_BYTES = 1 << 20
 #: levels of that message
 INFO, WARNING, ERROR = 20, 30, 40
 
@@ -67,3 +69,70 @@ def log(stamp_ns: int, level: int, name: str, text: str) -> bytes:
         data = word.encode() + b'\0'
         body += b'\0' * (-len(body) % 4) + struct.pack('<I', len(data)) + data
     return _LITTLE_ENDIAN + body + b'\0' * (-len(body) % 4) + struct.pack('<I', 0)
+
+
+class Topics:
+    """Where messages go, by topic: an MCAP file, or the channels of a server."""
+
+    def __init__(self) -> None:
+        self._channels: dict[str, Any] = {}
+
+    def add(self, topic: str, type_name: str, definition: str) -> None:
+        raise NotImplementedError
+
+    def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None:
+        """A topic of flat structs from (column, comment) of their fields."""
+        self.add(topic, type_name, definition(fields))
+
+    def has(self, topic: str) -> bool:
+        return topic in self._channels
+
+    def wants(self, topic: str) -> bool:
+        """Whether anybody reads it."""
+        return True
+
+    def write(self, topic: str, time_ns: int, data: bytes) -> None:
+        raise NotImplementedError
+
+    def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None:
+        if not self.has(topic):
+            self.add(topic, LOG_TYPE, LOG_DEFINITION)
+        self.write(topic, time_ns, log(time_ns, level, name, text))
+
+
+class McapFile(Topics):
+    """An MCAP file: chunks compressed with zstd, an index, attachments, metadata. It is whole after `finish`.
+
+    Raises ImportError without the package mcap.
+    """
+
+    def __init__(self, file: IO[bytes], library: str) -> None:
+        from mcap.writer import CompressionType, IndexType, Writer
+        super().__init__()
+        self._writer: Any = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD,
+                                   index_types=IndexType.ALL, enable_crcs=True)
+        self._writer.start(profile='ros2', library=library)
+        self._sequence: dict[str, int] = {}
+
+    def add(self, topic: str, type_name: str, definition: str) -> None:
+        schema = self._writer.register_schema(name=type_name, encoding='ros2msg', data=definition.encode())
+        self._channels[topic] = self._writer.register_channel(topic=topic, message_encoding='cdr', schema_id=schema)
+        self._sequence[topic] = 0
+
+    def write(self, topic: str, time_ns: int, data: bytes) -> None:
+        self._writer.add_message(channel_id=self._channels[topic], log_time=time_ns, publish_time=time_ns, data=data,
+                                 sequence=self._sequence[topic])
+        self._sequence[topic] += 1
+
+    def write_rows(self, topic: str, times_ns: np.ndarray, columns: Sequence[np.ndarray]) -> None:
+        for time_ns, data in zip(times_ns.tolist(), rows(columns)):
+            self.write(topic, time_ns, data)
+
+    def attach(self, name: str, media_type: str, data: bytes, time_ns: int) -> None:
+        self._writer.add_attachment(create_time=time_ns, log_time=time_ns, name=name, media_type=media_type, data=data)
+
+    def describe(self, name: str, data: dict[str, str]) -> None:
+        self._writer.add_metadata(name=name, data=data)
+
+    def finish(self) -> None:
+        self._writer.finish()

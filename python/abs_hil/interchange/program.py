@@ -48,8 +48,8 @@ def main(arguments: list[str]) -> int:
 
 
 def _convert(path: str, output: pathlib.Path) -> str:
-    from . import recorded, source
-    read = source.read(path)
+    from . import recorded
+    read = recorded.read(path)
     write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
     write_whole(output, lambda name: write(read, name))
     losses = '; '.join(read.losses)
@@ -58,7 +58,7 @@ def _convert(path: str, output: pathlib.Path) -> str:
 
 def _record(given: Any, output: pathlib.Path) -> str:
     from . import running
-    from .mcap_file import McapFile
+    from .messages import McapFile
     # A request to end must not cut the file short.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     result = ''

@@ -2,16 +2,15 @@
 import math
 import re
 import time
-from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterator
+from typing import Any
 
 from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
-from .mcap_file import McapFile
-from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, SIGNALS_TOPIC, SIGNALS_TYPE
-from .source import LEVELS, comment
+from .messages import McapFile, Topics
+from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, LEVELS, SIGNALS_TOPIC, SIGNALS_TYPE, comment
 
 STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
 #: ROS 2's stamps hold no later time
@@ -37,16 +36,6 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
             yield packet[0][len(prefix):], decode(packet[1])
         except ValueError:
             yield packet[0][len(prefix):], None
-
-
-class Topics(Protocol):
-    """Where messages go: McapFile, or the channels of a server."""
-
-    def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None: ...
-    def has(self, topic: str) -> bool: ...
-    def wants(self, topic: str) -> bool: ...
-    def write(self, topic: str, time_ns: int, data: bytes) -> None: ...
-    def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None: ...
 
 
 class Translator:

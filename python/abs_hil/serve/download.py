@@ -23,11 +23,11 @@ def make(kind: str, run: RunFacts, rows: np.ndarray) -> bytes:
     written = csv_bytes(columns)
     if kind == 'csv':
         return written
-    from ..interchange import recorded, source
+    from ..interchange import recorded
     with tempfile.TemporaryDirectory() as folder:
         place = pathlib.Path(folder, f'run-{run.number}.csv')
         place.write_bytes(written)
-        read = source.read(str(place))
-        read.events = [source.Event(event['time_s'], event['kind'], event['text']) for event in run.events]
+        read = recorded.read(str(place))
+        read.events = [recorded.Event(event['time_s'], event['kind'], event['text']) for event in run.events]
         recorded.to_mcap(read, str(place.with_suffix('.mcap')))
         return place.with_suffix('.mcap').read_bytes()

@@ -1,6 +1,5 @@
 """The same messages as an MCAP file's (interchange/running.py), live, for Foxglove, Lichtblick and PlotJuggler: the protocol
 foxglove.sdk.v1 by the package foxglove-sdk, whose threads are this process's only."""
-from collections.abc import Sequence
 from typing import Any
 
 from ..interchange import messages
@@ -28,7 +27,7 @@ class Foxglove(Translator):
         self._channels.server.stop()
 
 
-class Channels:
+class Channels(messages.Topics):
     """The topics of one server."""
 
     def __init__(self, port: int) -> None:
@@ -37,9 +36,9 @@ class Channels:
         except ImportError as error:
             raise ImportError(f'--foxglove needs the Python package foxglove-sdk ({error}): pip install foxglove-sdk, or '
                               'scripts/setup_python.sh in the source folder') from None
+        super().__init__()
         self._package: Any = foxglove
         self._context: Any = foxglove.Context()
-        self._channels: dict[str, Any] = {}
         self._made = 0
         try:
             # Without capabilities: a client can send nothing but what it wants to see.
@@ -48,22 +47,12 @@ class Channels:
         except RuntimeError as error:
             raise OSError(f'--foxglove cannot listen at {HOST}, port {port}: {error}; give another port') from None
 
-    def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None:
-        self.add(topic, type_name, messages.definition(fields))
-
-    def has(self, topic: str) -> bool:
-        return topic in self._channels
-
     def wants(self, topic: str) -> bool:
-        """Whether any viewer has asked for it."""
         return topic in self._channels and bool(self._channels[topic].has_sinks())
 
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
         if topic in self._channels:
             self._channels[topic].log(data, log_time=time_ns)
-
-    def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None:
-        self.write(topic, time_ns, messages.log(time_ns, level, name, text))
 
     def add(self, topic: str, type_name: str, definition: str) -> None:
         """A topic that exists already gets another definition."""
