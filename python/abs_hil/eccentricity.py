@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .files import write_text
-from .run import Run, load
+from .run import Run, load, stretches
 
 #: a cubic follows a coasting wheel over this time to far below a count
 WINDOW_S = 1.0
@@ -61,14 +61,13 @@ def fit(time_s: np.ndarray, counts: np.ndarray, counts_per_rev: int) -> Eccentri
 
 def of_run(run: Run, counts_per_rev: int = 4096) -> dict[str, Eccentricity]:
     """Upper and lower encoder, from the run's longest stretch of phase coast. Raises ValueError without one."""
-    coasting = np.concatenate([[False], np.asarray(run.columns['phase'] == 'coast'), [False]])
-    edges = np.flatnonzero(np.diff(coasting.astype(int)))
-    if not len(edges):
+    coasting = stretches(np.asarray(run.columns['phase'] == 'coast'))
+    if not coasting:
         raise ValueError('no phase coast in the run; let the wheels coast, as with --set experiment.coast_s=0.5')
-    first, last = max(zip(edges[::2], edges[1::2]), key=lambda part: part[1] - part[0])
+    first, last = max(coasting, key=lambda part: part[1] - part[0])
     time_s = np.asarray(run.columns['time_s'], dtype=float)
     first += int(np.searchsorted(time_s[first:last], time_s[first] + SETTLES_S))
-    rows = slice(int(first), int(last))
+    rows = slice(first, last)
     time_s = time_s[rows]
     return {wheel: fit(time_s, np.asarray(run.columns[f'{wheel}_counts'][rows]), counts_per_rev) for wheel in ('upper', 'lower')}
 

@@ -142,6 +142,12 @@ def phase_names(numbers: np.ndarray, names: tuple[str, ...] = PHASES) -> np.ndar
     return np.array(names, dtype=object)[numbers.astype(np.intp)]
 
 
+def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Rows [begin, end) of each stretch in which a flag stands."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
 def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
     """Nested tables by dotted key."""
     flat: dict[str, Any] = {}

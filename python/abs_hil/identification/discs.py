@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from .fit import CONVERGED
 from .intervals import WIDTH, Spread
-from .linear import step
+from .linear import to_rest
 from .parameters import disc_of
 from .problem import Disturbances, Fit
 
@@ -33,12 +32,10 @@ def _places(fit: Fit, wheel: str) -> np.ndarray:
 
 def _information(fit: Fit, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values and covariance of these parameters by the filter's information."""
-    whole = np.zeros((len(fit.keys), len(fit.keys)))
-    whole[np.ix_(fit.free, fit.free)] = fit.covariance()
     chosen = places.ravel()
     scale = fit.scale[chosen]
     values = np.array([fit.values[fit.keys[i]] for i in chosen])
-    return values, whole[np.ix_(chosen, chosen)] * np.outer(scale, scale)
+    return values, fit.covariance()[np.ix_(chosen, chosen)] * np.outer(scale, scale)
 
 
 def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> tuple[Fit, dict[str, float]]:
@@ -61,9 +58,7 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     kept = {p.key for p in left.parameters}
     fit = fit.copy(problem=left, free=fit.free[[key in kept for key in fit.keys]],
                    values={key: value for key, value in fit.values.items() if '_disc_' not in key or key in kept})
-    for _ in range(4):
-        if step(fit, disturbances, check) < CONVERGED:
-            break
+    to_rest(fit, disturbances, 4, check)
     return fit, largest
 
 

@@ -8,7 +8,6 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run
 from . import discs, intervals, rate_limit, structure
-from .delay import with_delay
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .forms import better_form
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
@@ -197,7 +196,7 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
 def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps; None if it ends nowhere."""
     try:
-        fit = with_delay(finish_fit(fit, check), check, say)
+        fit = rate_limit.with_delay(finish_fit(fit, check), check, say)
         if fit.rms_counts <= LARGEST_QUIET_RMS:
             limited = rate_limit.sought(fit, QUIET, check)
         else:

@@ -13,12 +13,11 @@ import numpy as np
 import scipy.optimize
 
 from ..core import _core
-from .linear import _measure, _relative, disc_waves_rad, filtered, run_filter, solved, step
+from .linear import CONVERGED, _measure, disc_waves_rad, filtered, run_filter, solved, step, to_rest
 from .linear import linearise as linearise
 from .logs import motion_of
 from .parameters import DELAY, RATE_LIMIT
 from .problem import (
-    COUNT_VARIANCE,
     DISTURBANCES,
     LARGEST_QUIET_RMS,
     QUIET,
@@ -39,19 +38,16 @@ ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0
 SMALL_DISC_RAD = 3e-4
 #: a residual without disturbances that hardly falls from above this, in counts, will not fall to the counts' steps
 HOPELESS_RMS = 10.0
-#: an iteration that moves less, in standard deviations, is the last
-CONVERGED = 0.1
 
 
-def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
-                ) -> Callable[[Mapping[str, float]], tuple[np.ndarray, np.ndarray, float]]:
-    """A function of other values of the parameters: normal equations, and -2 log likelihood without their change. It
-    simulates the affected pieces anew and keeps the sensitivities."""
+def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool]) -> Callable[[Mapping[str, float]], float]:
+    """A function of other values of some parameters: -2 log likelihood. It simulates the affected pieces anew and keeps the
+    sensitivities, so the other parameters may follow only as far as they are uncertain."""
     problem = fit.problem
-    settings = (_relative(problem, fit.values, fit.scale), disturbances, COUNT_VARIANCE * problem.radians_per_count**2)
-    rest = filtered(problem, [piece for piece, hit in zip(fit.pieces, affected) if not hit], *settings)
+    within = 5.0 * np.sqrt(np.diag(fit.covariance()))
+    rest = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], disturbances)
 
-    def costs(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, float]:
+    def cost_of(values: Mapping[str, float]) -> float:
         changed = []
         inputs = [problem.flawed(number, values)[0].inputs() for number in range(len(problem.logs))]
         for piece, hit in zip(fit.pieces, affected):
@@ -62,10 +58,11 @@ def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
                 moved.linear.update(angles=other['angles'], end=other['end'])
                 _measure(problem, values, moved)
                 changed.append(moved)
-        found = [*rest, *filtered(problem, changed, *settings)]
-        return (np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found)),
-                sum(float(one[2][0]) + one[3] for one in found))
-    return costs
+        found = [*rest, *filtered(fit, changed, disturbances)]
+        N, n = np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found))
+        x = solved(fit, N, n, -within, within)
+        return sum(float(one[2][0]) + one[3] for one in found) - float(2 * n @ x - x @ N @ x)
+    return cost_of
 
 
 def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
@@ -91,17 +88,13 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     if len(gaps) > most:  # evenly chosen ones; a later call looks closer
         gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
     affected = [_has_duties(problem, piece, edges[0], edges[-1]) for piece in fit.pieces]
-    # The sensitivities are those of the present u0: other parameters may follow only as far as they are uncertain.
-    within = np.zeros(len(fit.scale))
-    within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
-    others = other_costs(fit, disturbances, affected)
+    cost_of = other_costs(fit, disturbances, affected)
     tried = []
     for begin, end in gaps:
         check()
         # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
-        N, n, cost = others({**fit.values, 'u0': max(0.5 * (begin + end), end - 1e-3)})
-        x = solved(fit, N, n, -within, within)
-        tried.append((float(begin), float(end), cost - float(2 * n @ x - x @ N @ x)))
+        cost = cost_of({**fit.values, 'u0': max(0.5 * (begin + end), end - 1e-3)})
+        tried.append((float(begin), float(end), cost))
     best = min(tried, key=lambda gap: gap[2])
     fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
     return tried
@@ -218,10 +211,8 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
         if round_number < 3:
             present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
             say(f'disturbances: {describe(present)}')
-    for _ in range(6):
-        if moved < CONVERGED:
-            break
-        moved = step(fit, present, check)
+    if not moved < CONVERGED:
+        to_rest(fit, present, 6, check)
     return fit
 
 

@@ -260,8 +260,7 @@ def name_disagreement(found: Identified) -> None:
     fit = found.fit
     if len(found.logs) == 1:
         return
-    inverse = np.zeros((len(fit.scale), len(fit.scale)))
-    inverse[np.ix_(fit.free, fit.free)] = fit.covariance()
+    inverse = fit.covariance()
     for log, Nl, nl in zip(found.logs, fit.normal, fit.right):
         told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
         d = 1 / np.sqrt(np.diag(Nl)[told])

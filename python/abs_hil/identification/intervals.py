@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .linear import _relative, filtered, solved
+from .linear import filtered, solved
 from .parameters import COMBINATIONS
-from .problem import COUNT_VARIANCE, QUIET, Fit
+from .problem import QUIET, Fit
 
 REPLICATES = 80
 _BATCH = 20
@@ -35,8 +35,6 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
     """Spread of the estimates over random encoder phases. The estimate is linear in the counts near the solution."""
     problem = fit.problem
     per_count = problem.radians_per_count
-    way = _relative(problem, fit.values, fit.scale)
-    variance = COUNT_VARIANCE * per_count**2
     random = np.random.default_rng(seed)
     phases = random.uniform(size=(len(problem.logs), 2, replicates))
     estimates = []
@@ -51,7 +49,7 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
             residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
             changed.update(_core.condense(changed))
-            found = filtered(problem, [dataclasses.replace(piece, linear=changed)], way, QUIET, variance)[0]
+            found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]
             N, n = N + found[0], n + found[1]
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
@@ -62,14 +60,12 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
 
 def _by_prior(fit: Fit) -> np.ndarray:
     """What the first values' errors add to the covariance: all of it where the logs tell nothing."""
-    known = np.zeros((len(fit.scale), len(fit.scale)))
-    known[np.ix_(fit.free, fit.free)] = fit.covariance()
+    known = fit.covariance()
     return known @ np.diag(fit.prior()[0]) @ known
 
 
 def information(fit: Fit) -> Spread:
-    covariance = np.zeros((len(fit.scale), len(fit.scale)))
-    covariance[np.ix_(fit.free, fit.free)] = fit.covariance()
+    covariance = fit.covariance()
     return Spread(covariance, np.zeros(len(fit.scale)), 0, covariance)
 
 

@@ -7,8 +7,10 @@ import numpy as np
 from ..core import _core
 from .brake_flaws import amounts
 from .parameters import DEAD_TIME, DELAY, WHEELS, disc_of
-from .problem import COUNT_VARIANCE, Disturbances, Fit, Move, Piece, Problem
+from .problem import Disturbances, Fit, Move, Piece, Problem
 
+#: an iteration that moves less, in standard deviations, is the last
+CONVERGED = 0.1
 #: largest change of a parameter in one iteration, over its size
 LARGEST_STEP = 0.3
 #: a step after which -2 log likelihood is larger by more than this is halved, at most so often. It is that of a linearised
@@ -21,14 +23,10 @@ BRAKE_FACTOR = 1
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 
 
-def _scale(problem: Problem, values: Mapping[str, float]) -> np.ndarray:
-    return np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
-
-
 def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
               check: Callable[[], None] = lambda: None) -> np.ndarray:
     """Fills `linear` of each piece; returns the scale of the parameters' changes."""
-    scale = _scale(problem, values)
+    scale = np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
     steps = []
     for i, p in enumerate(problem.parameters):
         size = 1e-5 * scale[i]
@@ -134,35 +132,21 @@ def _duty_step(problem: Problem, u0: float) -> float:
     return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
 
 
-def directions(problem: Problem, scale: np.ndarray) -> np.ndarray:
-    """What each disturbance does, as changes of the parameters: shape (5, parameters)."""
+def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
+    """What each disturbance does, as scaled changes of the parameters: shape (5, parameters). A factor moves a parameter by
+    its own value (b2 may be smaller than its scale)."""
     keys = [p.key for p in problem.parameters]
     out = np.zeros((5, len(keys)))
-    for row, names in ((0, problem.form.road), (1, ('b1_Nm', 'b2_Nm')), (2, ('motor_stall_torque_Nm',))):
+    for row, names in enumerate((problem.form.road, ('b1_Nm', 'b2_Nm'), ('motor_stall_torque_Nm',), ('M10_Nm',), ('M20_Nm',))):
         for name in names:
             i = keys.index(name)
-            out[row, i] = 1.0
-    for row, name in ((3, 'M10_Nm'), (4, 'M20_Nm')):
-        i = keys.index(name)
-        out[row, i] = 1.0 / scale[i]
+            out[row, i] = (values[name] if row < 3 else 1.0) / scale[i]
     return out
 
 
-def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
-    """`directions`, where a factor moves a parameter by its own value (b2 may be smaller than its scale)."""
-    out = directions(problem, scale)
-    for i, p in enumerate(problem.parameters):
-        for row in range(3):
-            out[row, i] *= values[p.key] / scale[i]
-    return out
-
-
-def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = None) -> tuple[float, list[Any]]:
+def run_filter(fit: Fit, disturbances: Disturbances) -> tuple[float, list[Any]]:
     """-2 log likelihood but for a constant at the best parameters, and what `_core.filter_pieces` gave."""
-    problem = fit.problem
-    variance = COUNT_VARIANCE * problem.radians_per_count**2 if variance is None else variance
-    way = _relative(problem, fit.values, fit.scale)
-    found = filtered(problem, fit.pieces, way, disturbances, variance)
+    found = filtered(fit, fit.pieces, disturbances)
     N = sum(one[0] for one in found)
     n = sum(one[1][:, 0] for one in found)
     c = sum(float(one[2][0]) for one in found)
@@ -171,15 +155,16 @@ def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = No
     return c - float(n @ x) + log_variance, found
 
 
-def filtered(problem: Problem, pieces: Sequence[Piece], way: np.ndarray, disturbances: Disturbances,
-             variance: float) -> list[Any]:
+def filtered(fit: Fit, pieces: Sequence[Piece], disturbances: Disturbances) -> list[Any]:
     """What `_core.filter_pieces` gives of each piece, with a row and a column for every parameter."""
     out = []
-    size = len(problem.parameters)
+    way = _relative(fit.problem, fit.values, fit.scale)
+    size = len(fit.scale)
     for piece in pieces:
         at = piece.columns
         N, n, square, log_variance, readings = _core.filter_pieces(
-            [piece.linear], np.ascontiguousarray(way[:, at]), disturbances.sd, disturbances.time_constant_s, variance)[0]
+            [piece.linear], np.ascontiguousarray(way[:, at]), disturbances.sd, disturbances.time_constant_s,
+            fit.problem.variance_rad2)[0]
         whole, right = np.zeros((size, size)), np.zeros((size, n.shape[1]))
         whole[np.ix_(at, at)], right[at] = N, n
         out.append((whole, right, square, log_variance, readings))
@@ -240,6 +225,13 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     return fit.last_step
 
 
+def to_rest(fit: Fit, disturbances: Disturbances, most: int, check: Callable[[], None] = lambda: None) -> None:
+    """Steps until nothing moves, at most so many."""
+    for _ in range(most):
+        if step(fit, disturbances, check) < CONVERGED:
+            break
+
+
 def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
     Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
@@ -280,14 +272,13 @@ def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray
 def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
     problem = fit.problem
     way = _relative(problem, fit.values, fit.scale)
-    variance = COUNT_VARIANCE * problem.radians_per_count**2
     square = weights = 0.0
     for piece in fit.pieces:
         linear = dict(piece.linear)
         # The states are near already. A wide prior would only lose digits in the backward pass.
         linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
         change, left = _core.smooth(linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]), disturbances.sd,
-                                    disturbances.time_constant_s, variance)
+                                    disturbances.time_constant_s, problem.variance_rad2)
         square += left
         weights += float(linear['readings'][:, 1].sum())
         speeds = change[:, 2:4]

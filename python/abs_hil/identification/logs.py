@@ -12,7 +12,7 @@ import scipy.ndimage
 import scipy.signal
 
 from ..options import PathLike
-from ..run import Run, load
+from ..run import Run, load, stretches
 
 NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
 LEAST_ROWS = 200
@@ -132,19 +132,15 @@ def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
 
 
 def _unzipped(content: bytes) -> tuple[bytes, bool]:
-    stream = zlib.decompressobj(wbits=31)
-    try:
-        text = stream.decompress(content)
-    except zlib.error:
-        text = b''
-        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
-            try:
-                while chunk := file.read1(1 << 16):
-                    text += chunk
-            except (OSError, EOFError, zlib.error):
-                pass
-        return text, True
-    return text, not stream.eof
+    """What can be read, and whether the rest is missing or damaged."""
+    parts = []
+    with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+        try:
+            while part := file.read1(1 << 16):
+                parts.append(part)
+        except (OSError, EOFError, zlib.error):
+            return b''.join(parts), True
+    return b''.join(parts), False
 
 
 def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], sha256: str) -> Log:
@@ -266,8 +262,7 @@ def segments_of(log: Log, motion: Motion) -> list[tuple[int, int]]:
     breaks = np.flatnonzero((np.diff(log.wheels_apart) != 0) | (steps > 5 * log.period_s)) + 1
     segments = []
     for begin, end in zip([0, *breaks], [*breaks, len(log)]):
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], moves[begin:end], [False]]).astype(int)))
-        segments += [(begin + a, begin + b) for a, b in zip(edges[::2], edges[1::2])]
+        segments += [(begin + a, begin + b) for a, b in stretches(moves[begin:end])]
     return [(a, b) for a, b in segments if log.time_s[b - 1] - log.time_s[a] >= LEAST_SEGMENT_S]
 
 
@@ -275,8 +270,7 @@ def _being_parted(log: Log) -> np.ndarray:
     """The phase in which a person lifts the upper wheel, or lowers it: when in that phase, the log cannot tell. It is the
     first one with the wheels apart, without a duty, if another phase with the wheels apart follows."""
     out = np.zeros(len(log), dtype=bool)
-    apart = np.flatnonzero(np.diff(np.concatenate([[0.0], log.wheels_apart, [0.0]])))
-    for begin, end in zip(apart[::2], apart[1::2]):
+    for begin, end in stretches(log.wheels_apart != 0.0):
         same = log.phase[begin:end] == log.phase[begin]
         if same.all():
             continue

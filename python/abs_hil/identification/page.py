@@ -7,6 +7,7 @@ from ..core import _core
 from ..report.model import Curve, Figure, Label, Panel, Shade, run_style
 from ..report.page import render, view
 from ..report.tables import Table
+from ..run import stretches
 from .advice import Advice
 from .found import Identified
 from .results import shown
@@ -52,13 +53,8 @@ def _log_figures(found: Identified) -> list[Figure]:
              Panel(Label('duty', 'duty'), duties, height_px=90.0),
              Panel(Label('residual, counts', 'residual, counts'), residuals, height_px=110.0)],
             caption=f'{len(log)} rows; residual by phase: {_by_phase(found, number)}.', axis=f'log-{number + 1}',
-            shades=_apart(log.time_s, log.wheels_apart)))
+            shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)]))
     return figures
-
-
-def _apart(time_s: np.ndarray, apart: np.ndarray) -> list[Shade]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], apart != 0, [0]]).astype(int)))
-    return [Shade(float(time_s[a]), float(time_s[b - 1]), 'hold') for a, b in zip(edges[::2], edges[1::2])]
 
 
 def _by_phase(found: Identified, number: int) -> str:

@@ -127,6 +127,11 @@ class Problem:
     def radians_per_count(self) -> float:
         return 2 * np.pi / self.counts_per_rev
 
+    @property
+    def variance_rad2(self) -> float:
+        """Of a reading, by the counts' steps."""
+        return COUNT_VARIANCE * self.radians_per_count**2
+
 
 @dataclass
 class Move:
@@ -180,10 +185,13 @@ class Fit:
         return precision, precision * way / self.scale
 
     def covariance(self) -> np.ndarray:
-        """Of the free parameters' scaled changes, shape (free, free); with the prior."""
-        N = (self.information() + np.diag(self.prior()[0]))[np.ix_(self.free, self.free)]
+        """Of the parameters' scaled changes, (n, n), with the prior; zeros for those that are not free."""
+        free = np.ix_(self.free, self.free)
+        N = (self.information() + np.diag(self.prior()[0]))[free]
         d = 1 / np.sqrt(np.diag(N))
-        return np.asarray(np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d))
+        out = np.zeros((len(self.free), len(self.free)))
+        out[free] = np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d)
+        return out
 
 
 def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:

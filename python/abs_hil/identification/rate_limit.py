@@ -1,16 +1,19 @@
-"""The brake's rate limit: whether the logs show one, and where the fit of it begins."""
+"""The brake's rate limit and the delay of the board's inputs: whether the logs show one, and where the fit of it begins."""
 import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .fit import CONVERGED, other_costs
-from .linear import solved, step
+from .fit import other_costs
+from .linear import keep_normals, linearise, run_filter, solved, to_rest
 from .logs import Log
-from .parameters import RATE_LIMIT
-from .problem import Disturbances, Fit
+from .parameters import DELAY, RATE_LIMIT
+from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit
 from .start import brake_torques, static_torques
 
+#: a delay is believed if it is this many standard deviations from 0
+SURE_DELAY = 6.0
+LARGEST_DELAY_S = 0.02
 #: a limit is believed if it lowers -2 log likelihood by this
 CLEAR_GAIN = 50.0
 #: its standard deviation over its value, at most
@@ -19,10 +22,6 @@ LEAST_SURE = 0.05
 FIRST_SHARES = (0.98, 0.9, 0.6)
 SHARES = (*np.geomspace(0.06, 0.9, 15), 0.95, 0.98)
 WORTH_A_LOOK = 3.0
-
-
-def _brakes(logs: Sequence[Log]) -> bool:
-    return any(log.brake_pwm.any() for log in logs)
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
@@ -35,19 +34,15 @@ def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
 def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> Fit:
     """The fit with a limit of the brake's rate if one explains the logs clearly better. Needs the linearisation of `step`."""
     problem = fit.problem
-    if problem.with_rate_limit or RATE_LIMIT.key in problem.fixed or not _brakes(problem.logs):
+    if problem.with_rate_limit or RATE_LIMIT.key in problem.fixed or not any(log.brake_pwm.any() for log in problem.logs):
         return fit
     fastest = fastest_Nm_s(fit, problem.logs)
     affected = [bool(np.any(problem.logs[piece.log].brake_pwm[piece.rows] > 0)) for piece in fit.pieces]
-    within = np.zeros(len(fit.scale))
-    within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
     others = other_costs(fit, disturbances, affected)
 
     def cost_of(limit_Nm_s: float) -> float:
         check()
-        N, n, cost = others({**fit.values, RATE_LIMIT.key: limit_Nm_s})
-        x = solved(fit, N, n, -within, within)
-        return cost - float(2 * n @ x - x @ N @ x)
+        return others({**fit.values, RATE_LIMIT.key: limit_Nm_s})
 
     without = cost_of(0.0)
     if min(cost_of(share * fastest) for share in FIRST_SHARES) > without - WORTH_A_LOOK:
@@ -67,9 +62,7 @@ def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
     """As `sought`, with a few rounds around the limit."""
     found = sought(fit, fit.disturbances, check)
     if found is not fit:
-        for _ in range(3):
-            if step(found, found.disturbances, check) < CONVERGED:
-                break
+        to_rest(found, found.disturbances, 3, check)
     return found
 
 
@@ -79,13 +72,11 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
         return fit
     at = fit.keys.index(RATE_LIMIT.key)
     value = fit.values[RATE_LIMIT.key]
-    sd = float(np.sqrt(fit.covariance()[np.count_nonzero(fit.free[:at]), np.count_nonzero(fit.free[:at])]) * fit.scale[at])
+    sd = float(np.sqrt(fit.covariance()[at, at]) * fit.scale[at])
     if sd < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs):
         return fit
     fit = without(fit)
-    for _ in range(4):
-        if step(fit, disturbances, check) < CONVERGED:
-            break
+    to_rest(fit, disturbances, 4, check)
     return fit
 
 
@@ -96,3 +87,19 @@ def without(fit: Fit) -> Fit:
     at = fit.keys.index(RATE_LIMIT.key)
     return fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
                     values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))
+
+
+def with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
+    """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
+    problem = dataclasses.replace(fit.problem, with_delay=True)
+    late = fit.copy(problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0})
+    late.scale = linearise(problem, late.values, late.pieces, check)
+    N, n = keep_normals(late, run_filter(late, QUIET)[1])
+    x = solved(late, N, n)[-1]
+    if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:
+        return fit
+    to_rest(late, QUIET, 8, check)
+    if late.rms_counts > LARGEST_QUIET_RMS:
+        return fit
+    say(f'the inputs act {1e3 * late.values[DELAY]:.3g} ms late')
+    return late

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from ..run import Run, load
+from ..run import load
 from ..simulation import simulate
 from .found import Estimate, Identified
 from .parameters import DELAY, FORMS, WHEELS
@@ -18,6 +18,8 @@ from .parameters import DELAY, FORMS, WHEELS
 _DOING = ('control.', 'experiment.', 'observer.', 'gate.')
 #: a run's gate.* belongs to its board where it names board limits
 _LEFT_OUT = ('gate.brake_duty_max', 'gate.motor_duty_max')
+#: of the form inteco-mu, what no log tells
+_OF_THE_START = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
 
 
 def as_json(found: Identified) -> dict[str, Any]:
@@ -59,8 +61,7 @@ def as_toml(found: Identified) -> str:
     lines += [line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
     lines.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')
     if found.form == 'inteco-mu':
-        given = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
-        lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in given]
+        lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in _OF_THE_START]
     believed = _believed(found)
     return '\n'.join([*lines, *(['', '[model]', *believed] if believed else [])]) + '\n'
 
@@ -121,7 +122,7 @@ def plant_settings(found: Identified) -> dict[str, Any]:
     settings.update({f'plant.{key}': value for key, value in found.values().items() if key in base})
     settings['plant.encoder_counts_per_rev'] = base['encoder_counts_per_rev']
     if found.form == 'inteco-mu':
-        settings.update({f'plant.{key}': base[key] for key in ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')})
+        settings.update({f'plant.{key}': base[key] for key in _OF_THE_START})
     return settings
 
 
@@ -133,7 +134,7 @@ def validate(found: Identified, folder: PathLike) -> dict[str, Any]:
     if not config or run.summary.get('stop_distance_m') is None:
         raise ValueError(f'"{folder}": a run that validates needs its summary.json, with a stop')
     settings = {key: value for key, value in config.items() if key.startswith(_DOING) and key not in _LEFT_OUT}
-    known = _names()
+    known = {row['name'] for row in _core.keys(options())}
     for key, value in config.items():  # what the controllers believed, and not the plant that is identified
         name = key.partition('.')[2]
         if key.startswith('plant.') and f'model.{name}' in known:
@@ -144,15 +145,7 @@ def validate(found: Identified, folder: PathLike) -> dict[str, Any]:
     settings = {key: value for key, value in settings.items() if value is not None and key in known}
     predicted = simulate(controller=str(run.summary.get('controller', 'adaptive')),
                          experiment=str(run.summary.get('experiment', 'paper')), set=settings)
-    return {'run': str(folder), **_compared(run, predicted)}
-
-
-def _names() -> set[str]:
-    return {row['name'] for row in _core.keys(options())}
-
-
-def _compared(run: Run, predicted: Run) -> dict[str, float | None]:
-    out: dict[str, float | None] = {}
+    out: dict[str, Any] = {'run': str(folder)}
     for name in ('stop_distance_m', 'stop_time_s'):
         measured, simulated = run.summary.get(name), predicted.summary.get(name)
         out[name] = measured

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .brake_flaws import energy_J, fallen
-from .fit import CONVERGED
-from .linear import _relative, by_windows, linearise, step
+from .brake_flaws import amounts, fallen
+from .linear import _relative, by_windows, linearise, to_rest
 from .parameters import DEAD_TIME, DELAY, FADING, HYSTERESIS
-from .problem import COUNT_VARIANCE, DISTURBANCES, Disturbances, Fit
+from .problem import DISTURBANCES, Disturbances, Fit
 from .start import brake_torques, static_torques
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
@@ -131,24 +130,27 @@ def _solved(N: np.ndarray, n: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, n
     return covariance @ n[at], covariance
 
 
-def _signals(fit: Fit, number: int, most_Nm: float) -> Signals:
+def _signals(fit: Fit) -> list[Signals]:
+    """Of each log."""
     problem, values = fit.problem, fit.values
-    (log, brake), motion = problem.flawed(number, values), problem.motions[number]
-    torque, static = brake_torques(log, brake), static_torques(log, brake)
-    omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
-    sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
-    alone = ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)
-    return Signals(torque, static, most_Nm, energy_J(log, motion, brake), omega, motion.smooth_rad, sliding, alone,
-                   log.time_s - log.time_s[0])
+    most_Nm = max(max(float(static_torques(log, values).max()) for log in problem.logs), 1e-9)
+    out = []
+    for number, motion in enumerate(problem.motions):
+        log, brake = problem.flawed(number, values)
+        torque, static = brake_torques(log, brake), static_torques(log, brake)
+        omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
+        sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
+        flaws = amounts(log, motion, brake)
+        out.append(Signals(torque, static, most_Nm, -flaws[FADING.key], omega, motion.smooth_rad, sliding,
+                           flaws[DEAD_TIME.key], log.time_s - log.time_s[0]))
+    return out
 
 
 def _normals(fit: Fit, disturbances: Disturbances, causes: Sequence[Cause]) -> tuple[np.ndarray, np.ndarray]:
     """The normal equations with a column for each cause behind the parameters'."""
     problem, keys = fit.problem, fit.keys
     way = _relative(problem, fit.values, fit.scale)
-    most = max(max(float(static_torques(log, fit.values).max()) for log in problem.logs), 1e-9)
-    signals = [_signals(fit, number, most) for number in range(len(problem.logs))]
-    follows = [[cause.follows(one) for cause in causes] for one in signals]
+    follows = [[cause.follows(one) for cause in causes] for one in _signals(fit)]
     directions = np.zeros((len(keys), len(causes)))
     for number, cause in enumerate(causes):
         if cause.acts in DISTURBANCES:
@@ -168,7 +170,7 @@ def _normals(fit: Fit, disturbances: Disturbances, causes: Sequence[Cause]) -> t
         linear.update(_core.condense(linear))
         wider = np.concatenate([way[:, at], np.zeros((len(way), len(causes)))], axis=1)
         part, right, *_ = _core.filter_pieces([linear], np.ascontiguousarray(wider), disturbances.sd,
-                                              disturbances.time_constant_s, COUNT_VARIANCE * problem.radians_per_count**2)[0]
+                                              disturbances.time_constant_s, problem.variance_rad2)[0]
         place = np.concatenate([at, size + np.arange(len(causes))])
         N[np.ix_(place, place)] += part
         n[place] += right[:, 0]
@@ -212,11 +214,8 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     at = [p.key for p in problem.parameters].index(key)
     value = min(found.coefficient, 0.9 * problem.parameters[at].most)
     flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
-    for _ in range(6):
-        if step(flawed, disturbances, check) < CONVERGED:
-            break
-    place = np.count_nonzero(flawed.free[:at])
-    sd = float(np.sqrt(flawed.covariance()[place, place]) * flawed.scale[at])
+    to_rest(flawed, disturbances, 6, check)
+    sd = float(np.sqrt(flawed.covariance()[at, at]) * flawed.scale[at])
     return flawed if flawed.values[key] > SURE * sd else None
 
 
@@ -233,13 +232,11 @@ def sentence(causes: Sequence[Found], fit: Fit) -> str:
 def _where(cause: Cause, fit: Fit) -> tuple[str, str]:
     """The log and its phase that say most of a cause."""
     weight: dict[tuple[str, str], float] = {}
-    most = max(max(float(static_torques(log, fit.values).max()) for log in fit.problem.logs), 1e-9)
     turning = [np.zeros(len(log), dtype=bool) for log in fit.problem.logs]
     for piece in fit.pieces:
         turning[piece.log][piece.rows] = True
-    for number, log in enumerate(fit.problem.logs):
-        signals = _signals(fit, number, most)
-        follows = cause.follows(signals) * turning[number]
+    for log, signals, turns in zip(fit.problem.logs, _signals(fit), turning):
+        follows = cause.follows(signals) * turns
         if cause.acts in ('brake', 'c31_per_s', DELAY):
             follows = follows * (signals.torque_Nm > 0.0)
         if cause.acts == 'road':
