@@ -12,11 +12,11 @@ import abs_hil
 from abs_hil.core import _core
 from abs_hil.identification import intervals
 from abs_hil.identification.advice import advise, log_of
-from abs_hil.identification.fit import COUNT_VARIANCE, QUIET, Disturbances, Problem, _relative, linearise, pieces_of, start_fit
-from abs_hil.identification.linear import linearise_where_better, step
+from abs_hil.identification.fit import start_fit
+from abs_hil.identification.linear import _relative, linearise, linearise_where_better, step
 from abs_hil.identification.logs import load_log, motion_of, segments_of
 from abs_hil.identification.parameters import FORMS
-from abs_hil.identification.problem import Move
+from abs_hil.identification.problem import COUNT_VARIANCE, QUIET, Disturbances, Fit, Move, Problem, pieces_of
 from abs_hil.identification.program import main
 from abs_hil.identification.results import as_json, as_toml
 
@@ -219,10 +219,9 @@ def test_the_filter_is_generalised_least_squares(logs):
     problem, values, pieces, scale = small_problem(logs)
     piece = pieces[0]
     disturbances = Disturbances.of(0.02, 0.01, 0.3)
-    from abs_hil.identification.fit import Fit
     fit = Fit(problem, values, [piece], disturbances, 0.05, np.ones(len(scale), bool), scale=scale)
     way = _relative(problem, values, scale)
-    variance = COUNT_VARIANCE * problem.radians_per_count**2
+    variance = problem.variance_rad2
     linear = {**piece.linear, 'stands': np.zeros_like(piece.stands)}
     N, right, square, log_variance, _ = _core.filter_pieces([linear], way, disturbances.sd, disturbances.time_constant_s,
                                                             variance)[0]

@@ -14,7 +14,6 @@ import scipy.optimize
 
 from ..core import _core
 from .linear import CONVERGED, _measure, disc_waves_rad, filtered, run_filter, solved, step, to_rest
-from .linear import linearise as linearise
 from .logs import motion_of
 from .parameters import DELAY, RATE_LIMIT
 from .problem import (

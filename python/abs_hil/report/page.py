@@ -3,14 +3,12 @@ import base64
 import hashlib
 import importlib.util
 import pathlib
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from .model import Figure
 from .plots import compressed, packed, plot
-from .tables import Table
 from .text import significant
 
 _FOLDER = pathlib.Path(__file__).parent
@@ -23,42 +21,6 @@ MOST_BESIDE = 3  # runs whose figures of merit stand beside the first figure
 
 class Unavailable(RuntimeError):
     """A part that this computer lacks; the message says how to install it."""
-
-
-@dataclass
-class SeriesPart:
-    name: str
-    figure: Figure
-    groups: Table
-    table: Table
-    open: bool
-
-
-@dataclass
-class PaperPart:
-    claims: Table
-    statements: dict[str, tuple[str, str]]
-
-
-@dataclass
-class Contents:
-    title: str
-    version: str
-    lead: str
-    runs: int
-    metrics: Table
-    shared: str
-    phases: Table
-    differences: Table
-    timing: Table
-    events: Table
-    events_left_out: int
-    environment: Table
-    notes: list[str]
-    figures: list[Figure] = field(default_factory=list)
-    timing_figure: Figure | None = None
-    series: list[SeriesPart] = field(default_factory=list)
-    paper: PaperPart | None = None
 
 
 def plotly_js() -> str:
@@ -116,20 +78,19 @@ def view(figure: Figure, heading: str = '') -> dict[str, Any]:
             'alternative': _alternative(figure)}
 
 
-def page(contents: Contents) -> str:
-    shown = [figure for figure in contents.figures if contents.paper is None or figure.id in contents.paper.statements]
-    if contents.paper is None:
-        shown[1:1] = [part.figure for part in contents.series]
-        shown += [contents.timing_figure] if contents.timing_figure is not None else []
+def page(figures: list[Figure], series: list[dict[str, Any]], timing_figure: Figure | None, paper: dict[str, Any] | None,
+         runs: int, **parts: Any) -> str:
+    """The page of runs. series: name, figure and tables of each; paper: claims, and statements by figure; parts: texts and
+    tables, by the template's names."""
+    if paper is not None:
+        shown = [figure for figure in figures if figure.id in paper['statements']]
+    else:
+        shown = [figures[0], *(part['figure'] for part in series), *figures[1:], *([timing_figure] if timing_figure else [])]
     views = {}
     for number, figure in enumerate(shown, 1):
-        if contents.paper is not None:
-            heading = f'The paper’s figure {figure.paper}: {figure.heading}'
-        else:
-            heading = f'Figure {number}: {figure.heading}' + (f' (the paper’s figure {figure.paper})' if figure.paper else '')
-        views[figure.id] = view(figure, heading)
-    series = [{**vars(part), 'figure': views.get(part.figure.id)} for part in contents.series]
-    return render('page.html.j2', shown, **{
-        **vars(contents), 'series': series, 'many': contents.runs > MOST_OPEN_ROWS,
-        'beside': contents.runs <= MOST_BESIDE, 'timing_figure': views.get('timing'),
-        'figures': [views[figure.id] for figure in contents.figures if figure.id in views]})
+        of_paper = f'the paper’s figure {figure.paper}'
+        heading = f'Figure {number}: {figure.heading}' + (f' ({of_paper})' if figure.paper else '')
+        views[figure.id] = view(figure, heading if paper is None else f'{of_paper.capitalize()}: {figure.heading}')
+    return render('page.html.j2', shown, **parts, paper=paper, runs=runs, many=runs > MOST_OPEN_ROWS, beside=runs <= MOST_BESIDE,
+                  series=[{**part, 'figure': views.get(part['figure'].id)} for part in series],
+                  timing_figure=views.get('timing'), figures=[views[figure.id] for figure in figures if figure.id in views])

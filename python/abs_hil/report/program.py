@@ -14,7 +14,7 @@ from .files import find_runs
 from .page import PAGE_MARK, Unavailable
 from .pictures import FORMATS as PICTURES
 from .report import Report, Request, make
-from .tables import merits
+from .tables import Table, merits
 from .text import clean
 
 BAD_INPUT, UNAVAILABLE = 2, 3
@@ -108,16 +108,15 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
 
 
 def _print_table(made: Report) -> None:
-    for part in made.contents.series:
-        _print_rows(part.groups.header, part.groups.rows)
+    for part in made.parts['series']:
+        _print_rows(part['groups'])
         print()
-    metrics = made.contents.metrics
-    _print_rows(metrics.header, metrics.rows)
+    _print_rows(made.parts['metrics'])
 
 
-def _print_rows(header: list[str], rows: list[list[str]]) -> None:
-    lines = [header, *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+def _print_rows(table: Table) -> None:
+    lines = [table.header, *table.rows]
+    widths = [max(map(len, column)) for column in zip(*lines)]
     for line in lines:
         first = line[0].ljust(widths[0])
         rest = [cell.rjust(width) for cell, width in zip(line[1:], widths[1:])]
@@ -140,7 +139,7 @@ def _report(o: argparse.Namespace) -> None:
         _print_table(made)
     else:
         write_text(path, made.html())
-    _say(made.notes)
+    _say(made.parts['notes'])
     if not o.table:
         print(path)
     if o.merits:
@@ -155,8 +154,7 @@ def _report_study(o: argparse.Namespace) -> None:
     from ..studies import page
     results = page.results_of(o)
     if o.table:
-        table = page.quantile_table(results)
-        _print_rows(table.header, table.rows)
+        _print_rows(page.quantile_table(results))
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:

@@ -8,7 +8,7 @@ from . import paper
 from .figures import Choice, Options, run_figures
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
-from .page import Contents, PaperPart, SeriesPart, page
+from .page import page
 from .series import SeriesStudy, group_table, series_figure, series_table, study
 from .survey import Survey
 from .tables import (
@@ -35,15 +35,14 @@ class Request:
 
 @dataclass
 class Report:
+    """figures: all of them, in the order of the page; parts: what the page shows, by the names of its template."""
     runs: list[RunFiles]
     surveys: list[Survey]
-    studies: list[SeriesStudy]
-    figures: list[Figure]  # all of them, in the order of the page
-    notes: list[str]
-    contents: Contents
+    figures: list[Figure]
+    parts: dict[str, Any]
 
     def html(self) -> str:
-        return page(self.contents)
+        return page(**self.parts)
 
 
 def _title(request: Request, found: FoundRuns) -> str:
@@ -88,18 +87,18 @@ def make(request: Request, progress: Callable[[int, int], None] | None = None) -
     options = Options(request.choice, request.paper)
     _groups(studies, len(runs), options)
     surveys, figures = run_figures(runs, options, progress)
-    series = [SeriesPart(found_study.name, series_figure(number, found_study, runs, surveys),
-                         group_table(found_study, runs, surveys), series_table(found_study, runs, surveys), False)
-              for number, found_study in enumerate(studies, 1)]
+    series: list[dict[str, Any]] = [
+        {'name': one.name, 'figure': series_figure(number, one, runs, surveys), 'groups': group_table(one, runs, surveys),
+         'table': series_table(one, runs, surveys)} for number, one in enumerate(studies, 1)]
     timing = timing_figure(runs)
-    notes = all_notes(runs, surveys, found.notes)
     metrics, shared = metrics_table(runs, surveys)
     events, left_out = events_table(runs, surveys)
-    contents = Contents(_title(request, found), _core.version, paper.lead(runs) if request.paper else _lead(runs), len(runs),
-                        metrics, shared, phases_table(runs, surveys), differences_table(runs), timing_table(runs), events,
-                        left_out, environment_table(runs), notes, figures, timing, series)
-    if request.paper:
-        pairs = paper.pairs_of(runs, surveys)
-        contents.paper = PaperPart(paper.claims(pairs), paper.statements(pairs))
-    every = [part.figure for part in series] + figures + ([timing] if timing is not None else [])
-    return Report(runs, surveys, studies, every, notes, contents)
+    pairs = paper.pairs_of(runs, surveys) if request.paper else {}
+    parts = {'figures': figures, 'series': series, 'timing_figure': timing, 'runs': len(runs), 'title': _title(request, found),
+             'version': _core.version, 'lead': paper.lead(runs) if request.paper else _lead(runs),
+             'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if request.paper else None,
+             'metrics': metrics, 'shared': shared, 'phases': phases_table(runs, surveys), 'differences': differences_table(runs),
+             'timing': timing_table(runs), 'events': events, 'events_left_out': left_out, 'environment': environment_table(runs),
+             'notes': all_notes(runs, surveys, found.notes)}
+    every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
+    return Report(runs, surveys, every, parts)
