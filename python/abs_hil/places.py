@@ -1,6 +1,9 @@
-"""Where the files of this package are that are no Python: tables, libraries for FMUs."""
+"""Where the files of this package are that are no Python: tables, libraries for FMUs, the charts of its pages."""
 import pathlib
 import sys
+
+#: of uPlot, which draws the charts of abs_serve and of the lab
+CHARTS_SCRIPT, CHARTS_STYLE = 'uPlot.iife.min.js', 'uPlot.min.css'
 
 
 def folders() -> list[str]:
@@ -12,3 +15,13 @@ def place_of(name: str) -> pathlib.Path:
     """The file or folder of that name; where it should be if there is none."""
     places = [pathlib.Path(folder) / name for folder in folders()]
     return next((place for place in places if place.exists()), places[0])
+
+
+def charts() -> pathlib.Path:
+    """The folder of uPlot: installed in serve, in the source tree in third_party. Raises ImportError without it."""
+    package = pathlib.Path(__file__).resolve().parent
+    installed = package / 'serve' / 'uplot'
+    found = installed if installed.is_dir() else package.parents[1] / 'third_party' / 'uplot'
+    if not (found / CHARTS_SCRIPT).exists():
+        raise ImportError(f'"{found}" lacks {CHARTS_SCRIPT}, which draws the charts')
+    return found

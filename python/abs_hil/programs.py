@@ -9,11 +9,11 @@ import pathlib
 import sys
 
 #: name -> module with main(arguments) -> exit status
-PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
+PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.training',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
-            'lab': 'abs_hil.lab.program', 'python_host': 'abs_hil.interchange.host'}
+            'lab': 'abs_hil.lab.page', 'python_host': 'abs_hil.interchange.host'}
 
 
 class _Stdout(io.FileIO):

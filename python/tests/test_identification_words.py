@@ -10,7 +10,7 @@ from conftest import ABS_HIL
 
 import abs_hil
 from abs_hil.identification.advice import log_of
-from abs_hil.identification.progress import Progress
+from abs_hil.identification.program import Progress
 
 
 class Terminal(io.StringIO):

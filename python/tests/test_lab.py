@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from abs_hil.lab import exercise, page, program
+from abs_hil.lab import exercise, page
 
 WASM = b'\0asm\1\0\0\0'
 
@@ -54,7 +54,7 @@ def test_a_task_has_its_own_lines(tmp_path):
 
 def test_the_page_holds_all_it_needs(tmp_path, with_module):
     out = tmp_path / 'lab.html'
-    assert program.main(['--out', str(out), '--exercise', 'slip-of-the-peak']) == 0
+    assert page.main(['--out', str(out), '--exercise', 'slip-of-the-peak']) == 0
     text = out.read_text()
 
     def part(name):
@@ -68,11 +68,11 @@ def test_the_page_holds_all_it_needs(tmp_path, with_module):
 
 def test_without_the_module(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(page, '_FOLDER', tmp_path)
-    assert program.main(['--out', str(tmp_path / 'lab.html')]) == 2
+    assert page.main(['--out', str(tmp_path / 'lab.html')]) == 2
     assert 'abs_hil_lab.wasm) is missing; scripts/lab.sh' in capsys.readouterr().err
     assert not (tmp_path / 'lab.html').exists()
 
 
 def test_an_exercise_that_is_not_there(tmp_path, with_module, capsys):
-    assert program.main(['--out', str(tmp_path / 'lab.html'), '--exercise', 'nowhere']) == 2
+    assert page.main(['--out', str(tmp_path / 'lab.html'), '--exercise', 'nowhere']) == 2
     assert re.search('nowhere.*give a TOML file, or one of .*slip-of-the-peak', capsys.readouterr().err)

@@ -5,8 +5,7 @@ import pytest
 
 from abs_hil import TYPES
 from abs_hil.messages import QUANTITIES, REASONS
-from abs_hil.watch.plot import plot, range_of
-from abs_hil.watch.screen import ALARM, Screen, draw, number, one_line
+from abs_hil.watch.screen import ALARM, Screen, draw, number, one_line, plot, range_of
 from abs_hil.watch.view import BUCKETS, PLOTTED, RunView
 
 NUMBER_OF = {name: number for number, name in enumerate(QUANTITIES['phase']['values'])}

@@ -1,12 +1,20 @@
-"""The lab as one HTML file: the simulation core as WebAssembly, uPlot, and the page's own scripts."""
+"""abs_hil lab: a page that simulates the rig and its controllers in the browser, without a server (docs/lab.md).
+
+One HTML file: the simulation core as WebAssembly, uPlot, and the page's own scripts.
+"""
+import argparse
 import json
 import pathlib
+import sys
+from collections.abc import Sequence
 from typing import Any
 
 from ..core import _core
+from ..files import write_text
+from ..places import CHARTS_SCRIPT, CHARTS_STYLE, charts
 from ..report.page import Unavailable, _hash
 from ..report.plots import compressed
-from ..serve.uplot import SCRIPT, STYLE, uplot
+from .exercise import find, known, read
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
 #: in this order one script
@@ -33,19 +41,40 @@ def page(exercise: dict[str, Any] | None) -> str:
     import jinja2
     from markupsafe import Markup
     wasm = module()
-    charts = (uplot() / SCRIPT).read_text(encoding='utf-8')
+    drawer = (charts() / CHARTS_SCRIPT).read_text(encoding='utf-8')
     own = "'use strict';\n(() => {\n" + ''.join(_text(name) for name in _SCRIPTS) + '})();\n'
     # No script but these two runs, and nothing is fetched.
     policy = ("default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; "
-              f"script-src {_hash(charts)} {_hash(own)} 'wasm-unsafe-eval'")
+              f"script-src {_hash(drawer)} {_hash(own)} 'wasm-unsafe-eval'")
     data = json.dumps({'exercise': exercise})
     scripts = Markup(f'<script type="application/gzip" id="module">{compressed(wasm)}</script>\n'
                      f'<script type="application/gzip" id="page">{compressed(data.encode())}</script>\n'
-                     f'<script>{charts}</script>\n<script>{own}</script>')
-    css = ((uplot() / STYLE).read_text(encoding='utf-8')
+                     f'<script>{drawer}</script>\n<script>{own}</script>')
+    css = ((charts() / CHARTS_STYLE).read_text(encoding='utf-8')
            + (_FOLDER.parent / 'serve' / 'page' / 'serve.css').read_text(encoding='utf-8') + _text('lab.css'))
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
                                      loader=jinja2.FileSystemLoader(_FOLDER / 'page'))
     return environment.get_template('lab.html.j2').render(
         title=exercise['title'] if exercise else 'The ABS lab', exercise=exercise, version=_core.version, policy=policy,
         css=Markup(css), scripts=scripts) + '\n'
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='abs_hil lab', allow_abbrev=False, description=(__doc__ or '').split(' (docs')[0] + '.')
+    parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('lab.html'), help='the page (lab.html)')
+    parser.add_argument('--exercise', metavar='FILE',
+                        help='a TOML file that says what the page asks, hides and offers; or one that is ready: '
+                             + ', '.join(path.stem for path in known()))
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    given = _parser().parse_args(arguments)
+    try:
+        text = page(None if given.exercise is None else read(find(given.exercise)))
+        write_text(given.out, text)
+    except (ValueError, Unavailable, ImportError) as error:
+        print(f'abs_hil lab: {error}', file=sys.stderr)
+        return 2
+    print(f'{given.out}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser')
+    return 0

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core import load_network
-from ..messages import MOST_SIGNALS, QUANTITIES, decode
-from . import force
+from ..messages import MOST_SIGNALS, PHASES, QUANTITIES, decode
 from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
 from .runs import MOST_RUNS, MOST_TEXT, RunFacts
 
@@ -28,6 +27,11 @@ LATE_CYCLES = 16
 LONGEST_S = 1e6
 #: cycles of 60 ms at 10 kHz
 MOST_IN_WINDOW = 600
+#: of a point of the tyre's force over slip: its window, the fewest cycles in it, the least speed
+HALF_WINDOW_S = 0.03
+LEAST_SAMPLES = 12
+SLOW_M_S = 1.0
+BRAKE = PHASES.index('brake')
 
 
 class Feed:
@@ -133,7 +137,7 @@ class Feed:
     def _add_force(self, rows: np.ndarray) -> None:
         """A point for each bin of these rows: that of the window that ends with the bin's last row."""
         assert self._run is not None
-        if (rows[:, PLACE['phase']] != force.BRAKE).all():
+        if (rows[:, PLACE['phase']] != BRAKE).all():
             return
         cycles = self.history.cycles
         before = cycles.places(cycles.head - MOST_IN_WINDOW, cycles.head)
@@ -143,8 +147,8 @@ class Feed:
         for last in np.flatnonzero(np.diff(numbers, append=-1)).tolist():
             if last < len(known) - len(rows):
                 continue
-            first = int(np.searchsorted(time_s, time_s[last] - 2 * force.HALF_WINDOW_S))
-            found = force.point(known[first:last + 1], self._run.config)
+            first = int(np.searchsorted(time_s, time_s[last] - 2 * HALF_WINDOW_S))
+            found = force_point(known[first:last + 1], self._run.config)
             if found is not None:
                 rows[last - len(known), DERIVED_PLACE:] = found
 
@@ -156,6 +160,36 @@ def decode_fields() -> list[str]:
     if list(COLUMNS[:len(fields)]) != fields:
         raise ImportError('quantities.json: a quantity without a field in telemetry_t stands before one with a field')
     return fields
+
+
+def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float] | None:
+    """(slip, force in N) from the cycles of one window; None where it cannot be known. Cubics through both encoders' angles
+    over 60 ms give speed and deceleration in their middle, and the lower wheel's balance of torques gives the force (as
+    src/analysis/friction_curve.cpp does after a run).
+
+    config: the run's effective configuration. The model's parameters count, on the real rig the only ones.
+    """
+    model = {**config.get('plant', {}), **config.get('model', {})}
+    try:
+        r1_m, r2_m, J2_kg_m2, d2_Nms_rad, M20_Nm, counts_per_rev = (
+            float(model[name]) for name in ('r1_m', 'r2_m', 'J2_kg_m2', 'd2_Nms_rad', 'M20_Nm', 'encoder_counts_per_rev'))
+    except (KeyError, TypeError, ValueError):
+        return None
+    if len(rows) < LEAST_SAMPLES or (rows[:, PLACE['phase']] != BRAKE).any() or counts_per_rev <= 0 or r2_m <= 0:
+        return None
+    time_s = rows[:, PLACE['sample_time_s']]
+    scaled = (time_s - (time_s[0] + time_s[-1]) / 2) / HALF_WINDOW_S
+    counts = rows[:, [PLACE['upper_counts'], PLACE['lower_counts']]].astype(np.int64)
+    steps = (np.diff(counts, axis=0) + (1 << 31)) % (1 << 32) - (1 << 31)  # the counters wrap around at 32 bit
+    angles = np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0))) * (2 * np.pi / counts_per_rev)
+    if not np.isfinite(scaled).all():
+        return None
+    _, first, second, _ = np.linalg.lstsq(np.vander(scaled, 4, increasing=True), angles, rcond=None)[0]
+    omega, alpha = first / HALF_WINDOW_S, 2 * second / HALF_WINDOW_S ** 2
+    v_x_m_s = r2_m * omega[1]
+    if v_x_m_s < SLOW_M_S:
+        return None
+    return 1 - r1_m * omega[0] / v_x_m_s, -(J2_kg_m2 * alpha[1] + d2_Nms_rad * omega[1] + M20_Nm) / r2_m
 
 
 class Live:

@@ -8,7 +8,7 @@ from ..messages import MOST_SIGNALS, QUANTITIES
 
 #: length of a bin: 50 a second
 BIN_S = 0.02
-#: what the server itself computes (force.py)
+#: what the server itself computes (feed.py)
 DERIVED = ('tyre_slip', 'tyre_force_N')
 #: columns of the quantities; then come the places of a controller's own signals, then DERIVED
 COLUMNS = tuple(QUANTITIES)

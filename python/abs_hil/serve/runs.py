@@ -86,7 +86,7 @@ class RunFacts:
             config = parse_json(message.config_json)
         except ValueError:
             return
-        # Of the configuration, force.py wants these two.
+        # Of the configuration, feed.py wants these two.
         self.config = {part: config[part] for part in ('plant', 'model')
                        if isinstance(config, dict) and isinstance(config.get(part), dict)}
 

@@ -14,10 +14,10 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from ..messages import PHASES, QUANTITIES
+from ..places import charts
 from .download import TYPES, make
 from .feed import Feed
 from .history import BIN_S, DERIVED
-from .uplot import uplot
 from .viewer import REASON_KINDS, Bad, Viewer, real, whole
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
@@ -38,7 +38,7 @@ Command = Callable[[str, str, float], Awaitable[tuple[bool, str]]]
 
 def page_files() -> dict[str, pathlib.Path]:
     """Name -> file."""
-    found = [*(_FOLDER / 'page').iterdir(), *uplot().iterdir()]
+    found = [*(_FOLDER / 'page').iterdir(), *charts().iterdir()]
     return {path.name: path for path in found if path.suffix in KINDS}
 
 
