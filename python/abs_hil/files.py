@@ -29,6 +29,12 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *,
                          if error.strerror else str(error)) from None
 
 
+def refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
+    """Raises ValueError if a file is there and may not be replaced. A device or a pipe keeps nothing."""
+    if not replace and path.is_file():
+        raise ValueError(f'"{path}" exists; give another {option}, or --force to replace it')
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """write_whole for a text."""
     write_whole(path, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))

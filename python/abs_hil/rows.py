@@ -68,9 +68,10 @@ def read_rows(path: str | os.PathLike[str]) -> Rows:
     time_s = columns['time_s']
     if not np.isfinite(time_s).all() or (np.diff(time_s) < 0).any():
         _refuse(place, data[first:], names)
-    for name in TEXTS:
-        if name in columns:
-            columns[name] = _cleaned(columns[name])
+    for name in {*TEXTS} & {*columns}:
+        texts = columns[name]  # few different ones
+        clean = {text: _core.clean_text(str(text).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for text in set(texts)}
+        columns[name] = np.array([clean[text] for text in texts], dtype=object)
     return Rows(columns, truncated)
 
 
@@ -90,12 +91,6 @@ def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f'{place}:1: the header has the column {twice} twice')
     return names, first
-
-
-def _cleaned(texts: np.ndarray) -> np.ndarray:
-    """Texts of a column, fit to show. There are few different ones."""
-    clean = {text: _core.clean_text(str(text).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for text in set(texts)}
-    return np.array([clean[text] for text in texts], dtype=object)
 
 
 def _refuse(place: pathlib.Path, body: bytes, names: list[str]) -> None:

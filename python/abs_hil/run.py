@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,6 +146,17 @@ def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
     """Rows [begin, end) of each stretch in which a flag stands."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
+def names_apart(names: Iterable[str]) -> list[str]:
+    """Each name once: the second "run" is "run (2)"."""
+    apart: list[str] = []
+    for name in names:
+        own, number = name, 2
+        while own in apart:
+            own, number = f'{name} ({number})', number + 1
+        apart.append(own)
+    return apart
 
 
 def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from ..run import Run
+from ..run import Run, names_apart
 from . import discs, intervals, rate_limit, structure
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .forms import better_form
@@ -26,13 +26,9 @@ LARGEST_LAST_STEP = 5.0
 LARGEST_WANDER = 0.1
 
 
-def _silent(_: str) -> None:
-    pass
-
-
 def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-table1', *,
              fix: Mapping[str, float | None] | None = None, drift: Sequence[str] = (), form: str = 'auto', seed: int = 1,
-             say: Callable[[str], None] = _silent, check: Callable[[], None] = lambda: None) -> Identified:
+             say: Callable[[str], None] = lambda _: None, check: Callable[[], None] = lambda: None) -> Identified:
     """Estimates the rig's parameters from logs of counts and duties.
 
     logs:  runs of `simulate` or `load`, run folders, event logs or CSV files (see load_log), or Log objects
@@ -53,7 +49,8 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     for name in drift:
         if name != 'brake_torque':
             raise ValueError(f'--drift {name}: no such drift; give brake_torque')
-    loaded = _with_names([log if isinstance(log, Log) else load_log(log) for log in logs])
+    loaded = [log if isinstance(log, Log) else load_log(log) for log in logs]
+    loaded = [dataclasses.replace(log, name=name) for log, name in zip(loaded, names_apart(log.name for log in loaded))]
     if not loaded:
         raise ValueError('give at least one log')
     notes = [note for log in loaded for note in log.notes]
@@ -112,16 +109,6 @@ def _doubt(found: Identified, finished: Finished) -> str:
                 'is it of another rig, has something changed between the logs, or is the brake weaker in some of them '
                 '(--drift brake_torque)?')
     return ''
-
-
-def _with_names(logs: list[Log]) -> list[Log]:
-    """Each log with a name of its own."""
-    seen: dict[str, int] = {}
-    out = []
-    for log in logs:
-        seen[log.name] = seen.get(log.name, 0) + 1
-        out.append(log if seen[log.name] == 1 else dataclasses.replace(log, name=f'{log.name} ({seen[log.name]})'))
-    return out
 
 
 def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:

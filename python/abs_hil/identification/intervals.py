@@ -55,13 +55,9 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
     x = np.array(estimates)
     scatter = np.cov(x.T)
-    return Spread(scatter + _by_prior(fit), x.mean(axis=0), replicates, scatter)
-
-
-def _by_prior(fit: Fit) -> np.ndarray:
-    """What the first values' errors add to the covariance: all of it where the logs tell nothing."""
+    # The first values' errors add to it: all of it where the logs tell nothing.
     known = fit.covariance()
-    return known @ np.diag(fit.prior()[0]) @ known
+    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, x.mean(axis=0), replicates, scatter)
 
 
 def information(fit: Fit) -> Spread:

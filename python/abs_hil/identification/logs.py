@@ -183,15 +183,9 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
         if np.nanmin(counts[:, wheel]) == np.nanmax(counts[:, wheel]):
             raise ValueError(f'{name} never changes: the wheel stood, or its encoder is not connected')
     phase = np.asarray(columns.get('phase_name', columns.get('phase', np.full(len(time_s), ''))), dtype=object)
-    return Log(_name(place), place, sha256, time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
+    name = place.resolve().name.removesuffix('.gz').removesuffix('.csv').removesuffix('.lcmlog')
+    return Log(name, place, sha256, time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
                (apart != 0).astype(float), phase, late, notes, first_counts)
-
-
-def _name(place: pathlib.Path) -> str:
-    name = place.resolve().name
-    for suffix in ('.gz', '.csv', '.lcmlog'):
-        name = name.removesuffix(suffix)
-    return name
 
 
 def _unwrapped(counts: np.ndarray) -> np.ndarray:

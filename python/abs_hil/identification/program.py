@@ -8,7 +8,7 @@ import time
 from typing import TextIO
 
 from ..core import _core
-from ..files import write_text
+from ..files import refuse_existing, write_text
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import identify
@@ -130,8 +130,7 @@ def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
     o.out.mkdir(parents=True, exist_ok=True)
     for name in ('identified.json', 'model.toml', 'report.html'):
-        if (o.out / name).exists() and not o.force:
-            raise ValueError(f'"{o.out / name}" exists; give another --out, or --force to replace it')
+        refuse_existing(o.out / name, '--out', o.force)
     if not o.no_report:
         plotly_js()  # what the page needs, before the work rather than behind it
 

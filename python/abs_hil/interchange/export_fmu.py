@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ..core import _core
-from ..files import write_whole
+from ..files import refuse_existing, write_whole
 from ..places import place_of
 
 #: the libraries in an FMU: folder and file as this package has them, folder by FMI 2 and 3
@@ -145,7 +145,7 @@ def parser() -> argparse.ArgumentParser:
                    'repeated')
     p.add_argument('--fmi', metavar='N', type=int, default=2, help='version of FMI, 2 or 3 [%(default)s]')
     p.add_argument('--out', metavar='FILE.fmu', type=pathlib.Path, required=True, help='file to write')
-    p.add_argument('--force', action='store_true', help='write over an older file')
+    p.add_argument('--force', action='store_true', help='replace an existing file')
     p.add_argument('--version', action='version', version=_core.version)
     return p
 
@@ -155,8 +155,7 @@ def main(arguments: list[str]) -> int:
     try:
         if o.fmi not in (2, 3):
             raise ValueError(f'--fmi {o.fmi}: give 2 or 3')
-        if o.out.is_file() and not o.force:
-            raise ValueError(f'--out "{o.out}" exists; give --force to write over it, or another name')
+        refuse_existing(o.out, '--out', o.force)
         given = {name: getattr(o, name) for name in ('config', 'plant', 'model', 'controller', 'set')}
         model = _core.fmu_model({name: value for name, value in given.items() if value is not None})
         platforms = write(model, o.fmi, o.out)

@@ -82,7 +82,8 @@ def read(path: str) -> Source:
     if missing:
         raise ValueError(f'"{path}" has no column {missing[0]}: an older version wrote it. Convert its event log')
     source = Source(run, 0, [], {}, _missing_rows(run))
-    source.losses.extend(note for note in run.notes if _is_loss(note))
+    source.losses.extend(note for note in run.notes
+                         if not note.startswith(('an event log has no', 'no run.csv', 'no summary.json')))
     if place.is_dir():
         _read_folder(place, source)
     log = place / 'run.lcmlog' if place.is_dir() else place
@@ -94,10 +95,6 @@ def read(path: str) -> Source:
         if run.summary.get(figure):
             source.losses.append(f'the run itself counted {figure} = {run.summary[figure]}')
     return source
-
-
-def _is_loss(note: str) -> bool:
-    return not note.startswith(('an event log has no', 'no run.csv', 'no summary.json'))
 
 
 def _missing_rows(run: Run) -> list[str]:

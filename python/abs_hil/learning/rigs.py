@@ -115,10 +115,10 @@ class Rigs:
             self._begin(int(rig), int(self._index[rig]))
             self._episodes.replay(int(rig), log[self._begun[rig] - self._first:, rig].copy(), self._cycles)
 
-    def reset_all(self, first: int = 0) -> np.ndarray:
-        """Begins an episode of every rig, on the plants first, first + 1, ..."""
+    def reset_all(self, first: int = 0, plants: int | None = None) -> np.ndarray:
+        """Begins an episode of every rig, on the plants first, first + 1, ...; again from first after `plants` of them."""
         for rig in range(self.count):
-            self.reset(rig, first + rig)
+            self.reset(rig, first + rig % (plants or self.count))
         return self.observations()
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -51,9 +51,9 @@ class Curve:
     mean: list[float] = field(default_factory=list)
 
 
-def returns(rigs: Rigs, policy: Policy | None, first: int) -> np.ndarray:
-    """Sum of the rewards of one episode of every rig, on the plants first, first + 1, ..."""
-    observations = rigs.reset_all(first)
+def returns(rigs: Rigs, policy: Policy | None, first: int, plants: int | None = None) -> np.ndarray:
+    """Sum of the rewards of one episode of every rig, on the plants first, first + 1, ...; again from first after `plants`."""
+    observations = rigs.reset_all(first, plants)
     total = np.zeros(rigs.count)
     if policy is not None:
         policy.begin(rigs.count)
@@ -77,7 +77,8 @@ def train(task: Task, generations: int, seed: int, *, population: int = 40, plan
     for generation in range(generations):
         candidates = generator.normal(mean, spread, (population, Policy.SIZE))
         # Every candidate meets the same plants, others in each generation.
-        total = _common(rigs, candidates, plants, generation * plants)
+        total = returns(rigs, Policy(np.repeat(candidates, plants, axis=0)), generation * plants, plants)
+        total = total.reshape(population, plants).mean(axis=1)
         order = np.argsort(-total, kind='stable')[:elite_size]
         mean = candidates[order].mean(axis=0)
         spread = candidates[order].std(axis=0) + 0.02 / (1 + generation)
@@ -85,21 +86,6 @@ def train(task: Task, generations: int, seed: int, *, population: int = 40, plan
         curve.mean.append(float(returns(alone, Policy(mean), 0).mean()))
         progress(generation + 1, curve.mean[-1])
     return Policy(mean), curve
-
-
-def _common(rigs: Rigs, candidates: np.ndarray, plants: int, first: int) -> np.ndarray:
-    """Mean return of each candidate over the same plants."""
-    policy = Policy(np.repeat(candidates, plants, axis=0))
-    policy.begin(rigs.count)
-    for rig in range(rigs.count):
-        rigs.reset(rig, first + rig % plants)
-    observations = rigs.observations()
-    total = np.zeros(rigs.count)
-    ended = np.zeros(rigs.count, dtype=bool)
-    while not ended.all():
-        observations, rewards, ended = rigs.step(policy.actions(observations, rigs.task.period_s))
-        total += rewards
-    return total.reshape(len(candidates), plants).mean(axis=1)
 
 
 def judge(task: Task, policy: Policy | None, law: str, plants: int, threads: int = 0) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import _core
 from ..nesting import parse_toml
-from ..run import flattened, read_object, read_text, runs_in_series
+from ..run import flattened, names_apart, read_object, read_text, runs_in_series
 from .text import DASH, clean, number_text
 
 NAME_CHARACTERS = 40
@@ -221,18 +221,10 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None 
         else:
             raise ValueError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '
                              'run-0001/)')
-    _name_apart(found.runs)
+    for run, name in zip(found.runs, names_apart(run.name for run in found.runs)):
+        run.name = name
     _label(found.runs, labels or [])
     return found
-
-
-def _name_apart(runs: list[RunFiles]) -> None:
-    used: set[str] = set()
-    for run in runs:
-        name, number = run.name, 2
-        while run.name in used:
-            run.name, number = f'{name} ({number})', number + 1
-        used.add(run.name)
 
 
 def _label(runs: list[RunFiles], labels: list[str]) -> None:

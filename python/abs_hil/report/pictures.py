@@ -4,7 +4,7 @@ import pathlib
 from functools import partial
 from typing import Any
 
-from ..files import write_whole
+from ..files import refuse_existing, write_whole
 from .model import Curve, Figure, Panel, phase_colour
 
 FORMATS = ('pdf', 'png', 'svg')
@@ -104,8 +104,7 @@ def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool)
         raise ValueError(f'cannot create the folder "{folder}": {error.strerror}') from None
     paths = [folder / f'{figure.id}.{kind}' for figure in figures]
     for path in paths:
-        if not replace and path.is_file():
-            raise ValueError(f'"{path}" exists; give another folder, or --force to replace it')
+        refuse_existing(path, 'folder', replace)
     os.environ.setdefault('MPLBACKEND', 'agg')
     import logging
 

@@ -5,7 +5,7 @@ import re
 import sys
 
 from ..core import _core
-from ..files import write_text, write_whole
+from ..files import refuse_existing, write_text, write_whole
 from ..simulation import progress_shown
 from .export import FORMATS as EXPORTS
 from .export import Exporter
@@ -84,16 +84,11 @@ def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
     raise ValueError(f'"{path}" exists and is not a report of abs_report; give another --output, or --force to replace it')
 
 
-def _refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
-    if not replace and path.is_file():
-        raise ValueError(f'"{path}" exists; give another {option}, or --force to replace it')
-
-
 def _export(o: argparse.Namespace, columns: list[str]) -> None:
     exporter = Exporter(find_runs(o.runs, o.labels).runs, columns)
     if o.output:
         path = pathlib.Path(o.output)
-        _refuse_existing(path, '--output', o.force)
+        refuse_existing(path, '--output', o.force)
 
         def write(name: str) -> None:
             with open(name, 'wb') as file:
@@ -129,7 +124,7 @@ def _report(o: argparse.Namespace) -> None:
     if not o.table:
         _check_replaceable(path, o.force)
     if o.merits:
-        _refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
+        refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
     with progress_shown(sys.stderr.isatty()) as progress:
         made = make(request, progress)
     if o.merits:
@@ -158,7 +153,7 @@ def _report_study(o: argparse.Namespace) -> None:
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:
-        _refuse_existing(path, '--output', o.force)
+        refuse_existing(path, '--output', o.force)
         results.to_parquet(path)
     else:
         _check_replaceable(path, o.force)

@@ -53,10 +53,7 @@ def main(arguments: list[str]) -> int:
     except ValueError as error:
         print(f'abs_serve: {error}', file=sys.stderr)
         return 2
-    except ImportError as error:
-        print(f'abs_serve: {error}', file=sys.stderr)
-        return 3
-    except OSError as error:
+    except (ImportError, OSError) as error:
         print(f'abs_serve: {error}', file=sys.stderr)
         return 3
 

@@ -272,29 +272,25 @@ def as_json(answer: dict[str, Any]) -> str:
     return json.dumps(answer, allow_nan=False, separators=(',', ':'), default=list)
 
 
-def text(asked: dict[str, Any], name: str) -> str:
+def _given(asked: dict[str, Any], name: str, kind: Any, valid: Callable[[Any], bool], what: str) -> Any:
     value = asked.get(name)
-    if not isinstance(value, str) or len(value) > 200:
-        raise Bad(f'{name}: give a text')
+    if isinstance(value, bool) or not isinstance(value, kind) or not valid(value):
+        raise Bad(f'{name}: give {what}')
     return value
+
+
+def text(asked: dict[str, Any], name: str) -> str:
+    return _given(asked, name, str, lambda value: len(value) <= 200, 'a text')
 
 
 def real(asked: dict[str, Any], name: str) -> float:
-    value = asked.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise Bad(f'{name}: give a number')
-    return float(value)
+    return float(_given(asked, name, (int, float), math.isfinite, 'a number'))
 
 
 def whole(asked: dict[str, Any], name: str) -> int:
-    value = asked.get(name)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 31:
-        raise Bad(f'{name}: give a whole number')
-    return value
+    return _given(asked, name, int, lambda value: 0 <= value < 1 << 31, 'a whole number')
 
 
 def signals(asked: dict[str, Any]) -> list[str]:
-    value = asked.get('signals')
-    if not isinstance(value, list) or len(value) > MOST_SIGNALS or not all(isinstance(name, str) for name in value):
-        raise Bad(f'signals: give at most {MOST_SIGNALS} names')
-    return value
+    return _given(asked, 'signals', list, lambda names: len(names) <= MOST_SIGNALS and all(isinstance(one, str) for one in names),
+                  f'at most {MOST_SIGNALS} names')

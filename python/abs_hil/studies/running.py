@@ -11,6 +11,7 @@ from typing import Any, Union
 import numpy as np
 
 from ..core import _core
+from ..options import text_of
 from ..run import Run
 from ..simulation import progress_shown, run_of
 from .results import StudyResults, load_study
@@ -85,10 +86,8 @@ def _value(value: Any) -> str:
         return '{ ' + ', '.join(f'{_key(key)} = {_value(inner)}' for key, inner in value.items()) + ' }'
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    if isinstance(value, (int, float)):
-        return repr(value)
     if isinstance(value, (list, tuple, np.ndarray, range)):
         return '[' + ', '.join(_value(inner) for inner in value) + ']'
+    if isinstance(value, (int, float)):
+        return text_of(value)
     raise ValueError(f'a study takes numbers, flags, texts, lists and dictionaries, not {value!r}')
