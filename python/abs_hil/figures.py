@@ -6,10 +6,13 @@ from .core import _core
 
 #: the largest excess of slip over its reference; for formulas that use this figure
 OVERSHOOT = 'slip_overshoot'
+#: endings of names, and their units
+_UNITS = {'_rad_s': 'rad/s', '_m_s': 'm/s', '_Nm': 'N m', '_N': 'N', '_m': 'm', '_s': 's', '': ''}
 
 
-#: endings of names, and how a heading writes them
-_UNITS = {'_rad_s': '(rad/s)', '_m_s': '(m/s)', '_Nm': '(N m)', '_N': 'N', '_m': 'm', '_s': 's'}
+def with_unit(title: str, unit: str) -> str:
+    """A heading: "distance / m", "torque variation / (N m)"."""
+    return f'{title} / ({unit})' if ' ' in unit or '/' in unit else f'{title} / {unit}' if unit else title
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,7 @@ class FigureOfMerit:
     @property
     def heading(self) -> str:
         """Title and unit, for the head of a column: "torque variation / (N m)"."""
-        unit = f'({self.unit})' if ' ' in self.unit else self.unit
-        return f'{self.title} / {unit}' if unit else self.title
+        return with_unit(self.title, self.unit)
 
 
 @cache
@@ -41,6 +43,5 @@ def heading_of(name: str) -> str:
     """A figure's heading; of a name that the table lacks, as of a study's own metric, its words and unit."""
     if name in figures():
         return figures()[name].heading
-    ending = next((ending for ending in _UNITS if name.endswith(ending)), '')
-    words = name.removesuffix(ending).replace('_', ' ')
-    return f'{words} / {_UNITS[ending]}' if ending else words
+    ending = next(ending for ending in _UNITS if name.endswith(ending))
+    return with_unit(name.removesuffix(ending).replace('_', ' '), _UNITS[ending])

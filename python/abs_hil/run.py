@@ -148,6 +148,13 @@ def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
+def name_phases(columns: dict[str, Any]) -> None:
+    """Makes arrays of names of what the core gives as numbers and lists."""
+    columns['phase'] = phase_names(np.clip(columns['phase'], 0, len(PHASES) - 1))
+    if 'phase_name' in columns:
+        columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
+
+
 def names_apart(names: Iterable[str]) -> list[str]:
     """Each name once: the second "run" is "run (2)"."""
     apart: list[str] = []
@@ -283,9 +290,7 @@ def _load_log(path: pathlib.Path) -> Run:
     if rows == 0:
         raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil'
                          + (', or another version of abs_hil recorded it' if unreadable else ''))
-    columns['phase'] = phase_names(np.clip(columns['phase'], 0, len(PHASES) - 1))
-    if 'phase_name' in columns:
-        columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
+    name_phases(columns)
     summary: dict[str, Any] = {}
     if experiment:
         names = ('experiment', 'controller', 'plant', 'backend')

@@ -12,7 +12,7 @@ import numpy as np
 
 from .core import _core
 from .options import PathLike, Value, options
-from .run import Run, Series, phase_names
+from .run import Run, Series, name_phases
 
 if TYPE_CHECKING:
     import pandas
@@ -68,9 +68,7 @@ def _law_of(controller: Any) -> Any:
 
 def run_of(columns: dict[str, Any], signals: Sequence[str], summary: str, config_toml: str) -> Run:
     """The Run of what the core returns for a simulation."""
-    columns['phase'] = phase_names(columns['phase'])
-    if 'phase_name' in columns:
-        columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
+    name_phases(columns)
     return Run(columns, json.loads(summary), tuple(signals), config_toml=config_toml)
 
 

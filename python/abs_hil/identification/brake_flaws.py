@@ -1,4 +1,4 @@
-"""Flaws of the brake that the plant has (docs/plants.md) and that are fitted where the logs show them.
+"""The brake's torque, and flaws of the brake that the plant has (docs/plants.md) and that are fitted where the logs show them.
 
 Dead time d, fading k and hysteresis h change the torque that the duty u asks for, before the lag (6):
 
@@ -13,10 +13,29 @@ import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
+import scipy.signal
 
 from .logs import Log, Motion
-from .parameters import DEAD_TIME, FADING, FLAWS, HYSTERESIS
-from .start import brake_torques, static_torques
+from .parameters import DEAD_TIME, FADING, FLAWS, HYSTERESIS, RATE_LIMIT
+
+
+def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
+    """The brake's torque at each row by (6) and (7), from 0, N m."""
+    static = static_torques(log, values)
+    keeps = float(np.exp(-values['c31_per_s'] * log.period_s))
+    limit = values.get(RATE_LIMIT.key, 0.0) * log.period_s
+    if limit == 0.0:
+        return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static))
+    torque = np.zeros(len(static))
+    for i in range(len(static) - 1):
+        torque[i + 1] = torque[i] + min(max((1.0 - keeps) * (static[i] - torque[i]), -limit), limit)
+    return torque
+
+
+def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
+    """(7) at each row, N m."""
+    return np.where(log.brake_pwm >= values['u0'],
+                    np.maximum(0.0, values['b1_Nm'] * log.brake_pwm + values['b2_Nm']), 0.0)
 
 
 def act(values: Mapping[str, float]) -> bool:

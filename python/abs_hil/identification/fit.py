@@ -145,8 +145,7 @@ def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], 
 
 def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], None],
              discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
-    values = first_values(problem.form, problem.base, problem.given, start, problem.logs, problem.motions,
-                          problem.segments, problem.fixed, other_form)
+    values = first_values(problem, start, other_form)
     values.setdefault(DELAY, 0.0)
     values.setdefault(RATE_LIMIT.key, problem.fixed.get(RATE_LIMIT.key, 0.0))
     values.update({key: 1.0 for key in problem.factors})

@@ -79,7 +79,7 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     """What there is, without intervals."""
     size = len(fit.problem.parameters)
     nothing = np.full((size, size), np.nan)
-    found = assembled(Finished(fit, intervals.Spread(nothing, np.zeros(size), 0, nothing), [], None, {}), start,
+    found = assembled(Finished(fit, intervals.Spread(nothing, nothing), [], None, {}), start,
                        ['interrupted: the values so far are kept, without intervals; for all, the same command with --force'])
     found.notes[1:] = notes
     without_intervals(found)

@@ -21,12 +21,9 @@ LIKELY = 3.84
 
 @dataclass
 class Spread:
-    """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free, and how the
-    bootstrap's mean is off, (n,). `of_logs`: the part of the covariance that the logs' own errors make, for combinations
-    that hardly depend on the first values."""
+    """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free. `of_logs`: the part
+    of it that the logs' own errors make, for combinations that hardly depend on the first values."""
     covariance: np.ndarray
-    bias: np.ndarray
-    replicates: int
     of_logs: np.ndarray
 
 
@@ -53,16 +50,14 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
             N, n = N + found[0], n + found[1]
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
-    x = np.array(estimates)
-    scatter = np.cov(x.T)
+    scatter = np.cov(np.transpose(estimates))
     # The first values' errors add to it: all of it where the logs tell nothing.
     known = fit.covariance()
-    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, x.mean(axis=0), replicates, scatter)
+    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter)
 
 
 def information(fit: Fit) -> Spread:
-    covariance = fit.covariance()
-    return Spread(covariance, np.zeros(len(fit.scale)), 0, covariance)
+    return Spread(fit.covariance(), fit.covariance())
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:

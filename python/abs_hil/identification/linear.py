@@ -220,7 +220,6 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     old = fit.values
     fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
     fit.moved = Move(old, fit.values, before, fit.pieces, float(fit.cost.sum()))
-    fit.iterations += 1
     fit.last_step = float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
     return fit.last_step
 
@@ -260,12 +259,10 @@ def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | N
 def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
     logs, n = len(fit.problem.logs), len(fit.scale)
     fit.normal, fit.right, fit.cost = np.zeros((logs, n, n)), np.zeros((logs, n)), np.zeros(logs)
-    fit.readings = 0.0
-    for piece, (N, right, square, log_variance, readings) in zip(fit.pieces, found):
+    for piece, (N, right, square, log_variance, _) in zip(fit.pieces, found):
         fit.normal[piece.log] += N
         fit.right[piece.log] += right[:, 0]
         fit.cost[piece.log] += square[0] + log_variance
-        fit.readings += readings
     return fit.normal.sum(axis=0), fit.right.sum(axis=0)
 
 

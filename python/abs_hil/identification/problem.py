@@ -10,10 +10,9 @@ import numpy as np
 
 from ..core import _core
 from ..options import options
-from .brake_flaws import act, with_flaws
+from .brake_flaws import act, brake_torques, with_flaws
 from .logs import Log, Motion, motion_of, segments_of
 from .parameters import DELAY, FLAWS, RATE_LIMIT, Form, Parameter, base_options, disc_of
-from .start import brake_torques
 
 #: an even distribution within one count, counts^2
 COUNT_VARIANCE = 1 / 12
@@ -159,9 +158,7 @@ class Fit:
     normal: np.ndarray = field(default_factory=lambda: np.empty(0))
     right: np.ndarray = field(default_factory=lambda: np.empty(0))
     cost: np.ndarray = field(default_factory=lambda: np.empty(0))
-    readings: float = 0.0
     rms_counts: float = np.nan
-    iterations: int = 0
     moved: Move | None = None
     last_step: float = 0.0
 
@@ -187,11 +184,15 @@ class Fit:
     def covariance(self) -> np.ndarray:
         """Of the parameters' scaled changes, (n, n), with the prior; zeros for those that are not free."""
         free = np.ix_(self.free, self.free)
-        N = (self.information() + np.diag(self.prior()[0]))[free]
-        d = 1 / np.sqrt(np.diag(N))
         out = np.zeros((len(self.free), len(self.free)))
-        out[free] = np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d)
+        out[free] = inverse((self.information() + np.diag(self.prior()[0]))[free])
         return out
+
+
+def inverse(N: np.ndarray) -> np.ndarray:
+    """Of a positive definite matrix whose rows may differ by many powers of ten."""
+    d = 1 / np.sqrt(np.diag(N))
+    return np.asarray(np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d))
 
 
 def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:

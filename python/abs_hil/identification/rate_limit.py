@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .brake_flaws import brake_torques, static_torques
 from .fit import other_costs
 from .linear import keep_normals, linearise, run_filter, solved, to_rest
 from .logs import Log
 from .parameters import DELAY, RATE_LIMIT
 from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit
-from .start import brake_torques, static_torques
 
 #: a delay is believed if it is this many standard deviations from 0
 SURE_DELAY = 6.0

@@ -9,15 +9,15 @@ The tyre's parameters then fit the force that the lower wheel felt.
 """
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.optimize
 import scipy.signal
 
 from ..core import _core
-from .logs import Log, Motion
-from .parameters import RATE_LIMIT, Form
+from .brake_flaws import brake_torques
+from .logs import Log
+from .problem import Problem
 
 INTERVAL_S = 0.04
 COARSE_S = 0.004
@@ -28,6 +28,7 @@ LEAST_SLOPE = 0.05
 @dataclass
 class _Pieces:
     """Intervals of all logs: speeds at their ends, integrals over them."""
+    parts: list[tuple[int, np.ndarray, np.ndarray]]  # log, first row, last row
     apart: np.ndarray
     dw: np.ndarray  # (intervals, 2)
     angle: np.ndarray  # (intervals, 2)
@@ -35,37 +36,16 @@ class _Pieces:
     turning: np.ndarray  # share of time that each wheel turns (intervals, 2)
     motor: np.ndarray  # int u dt
     motor_speed: np.ndarray  # int u w2 dt
-    parts: list[tuple[int, np.ndarray, np.ndarray]]  # log, first row, last row
-    log: np.ndarray
-
-
-def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
-    """The brake's torque at each row by (6) and (7), from 0, N m."""
-    static = static_torques(log, values)
-    keeps = float(np.exp(-values['c31_per_s'] * log.period_s))
-    limit = values.get(RATE_LIMIT.key, 0.0) * log.period_s
-    if limit == 0.0:
-        return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static))
-    torque = np.zeros(len(static))
-    for i in range(len(static) - 1):
-        torque[i + 1] = torque[i] + min(max((1.0 - keeps) * (static[i] - torque[i]), -limit), limit)
-    return torque
-
-
-def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
-    """(7) at each row, N m."""
-    return np.where(log.brake_pwm >= values['u0'],
-                    np.maximum(0.0, values['b1_Nm'] * log.brake_pwm + values['b2_Nm']), 0.0)
 
 
 def _integral(log: Log, values: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(log.time_s))])
 
 
-def _pieces(logs: Sequence[Log], motions: Sequence[Motion], segments: Sequence[Sequence[tuple[int, int]]]) -> _Pieces:
-    rows: list[list[np.ndarray]] = [[] for _ in range(8)]
+def _pieces(problem: Problem) -> _Pieces:
+    columns = []
     parts = []
-    for number, (log, motion, pieces) in enumerate(zip(logs, motions, segments)):
+    for number, (log, motion, pieces) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
         step = max(2, round(INTERVAL_S / log.period_s))
         first = np.concatenate([np.arange(a + step, b - 2 * step, step) for a, b in pieces] or [np.empty(0, dtype=int)])
         first = first.astype(int)
@@ -73,41 +53,35 @@ def _pieces(logs: Sequence[Log], motions: Sequence[Motion], segments: Sequence[S
         w = motion.speed_rad_s
         motor, speed = _integral(log, log.motor_pwm), _integral(log, log.motor_pwm * w[:, 1])
         turning = np.stack([_integral(log, (~motion.stands[:, i]).astype(float)) for i in range(2)], axis=1)
-        values = (log.wheels_apart[first], w[last] - w[first], motion.smooth_rad[last] - motion.smooth_rad[first],
-                  log.time_s[last] - log.time_s[first], turning[last] - turning[first], motor[last] - motor[first],
-                  speed[last] - speed[first], np.full(len(first), number))
-        for column, value in zip(rows, values):
-            column.append(value)
+        columns.append((log.wheels_apart[first] != 0, *(along[last] - along[first] for along in (
+            w, motion.smooth_rad, log.time_s, turning, motor, speed))))
         parts.append((number, first, last))
-    joined = [np.concatenate(column) for column in rows]
-    return _Pieces(joined[0] != 0, joined[1], joined[2], joined[3], joined[4], joined[5], joined[6], parts, joined[7])
+    return _Pieces(parts, *(np.concatenate(column) for column in zip(*columns)))
 
 
-def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mapping[str, float], logs: Sequence[Log],
-                 motions: Sequence[Motion], segments: Sequence[Sequence[tuple[int, int]]],
-                 fixed: Mapping[str, float], other_form: Mapping[str, float] | None = None) -> dict[str, float]:
-    """First values of the form's parameters. `given`: J2_kg_m2 and r2_m; `start` fills what the logs do not tell;
-    `other_form`: first values of another form, from the same logs: all but the tyre's hold here, too."""
-    pieces = _pieces(logs, motions, segments)
-    r2, J2 = given['r2_m'], given['J2_kg_m2']
-    value = {p.key: float(start[p.key]) for p in form.parameters}
-    value.update(fixed)
+def first_values(problem: Problem, start: Mapping[str, float],
+                 other_form: Mapping[str, float] | None = None) -> dict[str, float]:
+    """First values of the form's parameters. `start` fills what the logs do not tell; `other_form`: first values of another
+    form, from the same logs: all but the tyre's hold here, too."""
+    pieces = _pieces(problem)
+    value = {p.key: float(start[p.key]) for p in problem.form.parameters}
+    value.update(problem.fixed)
     if other_form is not None:
         value.update({key: number for key, number in other_form.items() if key in value})
-        _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
+        _tyre(value, pieces, problem)
         return value
-    if 'r1_m' not in fixed:
+    if 'r1_m' not in problem.fixed:
         rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
         for rest_s in (1.0, 0.3):  # after a locked wheel, rolling takes its time
-            rolling = rolls & ~_braked(pieces, logs, rest_s)
+            rolling = rolls & ~_braked(pieces, problem.logs, rest_s)
             if rolling.sum() > 3:
-                value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
+                value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
-    _scan_brake(value, pieces, logs, motions, r2, J2, fixed)
-    for p in form.parameters:
-        if p.key not in fixed:
+    _scan_brake(value, pieces, problem)
+    for p in problem.form.parameters:
+        if p.key not in problem.fixed:
             value[p.key] = float(np.clip(value[p.key], p.least, p.most))
-    _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
+    _tyre(value, pieces, problem)
     return value
 
 
@@ -127,9 +101,9 @@ _LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_st
            'b2_Nm')
 
 
-def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], motions: Sequence[Motion], r2: float,
-                J2: float, fixed: Mapping[str, float]) -> None:
-    r1 = value['r1_m']
+def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
+    logs, fixed = problem.logs, problem.fixed
+    r1, r2, J2 = value['r1_m'], problem.given['r2_m'], problem.given['J2_kg_m2']
     n = len(pieces.duration)
     zero = np.zeros(n)
     turning1, turning2 = pieces.turning.T
@@ -140,7 +114,7 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], m
     # The scan needs no more than every fourth millisecond.
     thin = [max(1, round(COARSE_S / log.period_s)) for log in logs]
     coarse = [(log.time_s[::k], log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
-              for log, motion, k in zip(logs, motions, thin)]
+              for log, motion, k in zip(logs, problem.motions, thin)]
 
     def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
         slopes: list[np.ndarray] = []
@@ -256,10 +230,10 @@ def _robust(A: np.ndarray, y: np.ndarray, A_pull: np.ndarray, y_pull: np.ndarray
     return found, float(np.sum(np.minimum(residual**2, limit * np.abs(residual))))
 
 
-def _tyre(form: Form, base: Any, value: dict[str, float], pieces: _Pieces, logs: Sequence[Log],
-          motions: Sequence[Motion], r2: float, J2: float, fixed: Mapping[str, float]) -> None:
+def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
     """Fits the tyre's parameters to the mean force of each interval, as the lower wheel felt it."""
-    tyre = [p for p in form.parameters if p.acts == 'contact' and p.key != 'r1_m' and p.key not in fixed]
+    form, base, r2, J2 = problem.form, problem.base, problem.given['r2_m'], problem.given['J2_kg_m2']
+    tyre = [p for p in form.parameters if p.acts == 'contact' and p.key != 'r1_m' and p.key not in problem.fixed]
     contact = ~pieces.apart
     if not tyre or contact.sum() < 10:
         return
@@ -268,10 +242,10 @@ def _tyre(form: Form, base: Any, value: dict[str, float], pieces: _Pieces, logs:
              - value['M20_Nm'] * pieces.turning[:, 1]) / (r2 * pieces.duration)
     middle1, middle2, torque = [], [], []
     for number, first, last in pieces.parts:
-        log = logs[number]
-        Tb = brake_torques(log, value)
+        motion = problem.motions[number]
+        Tb = brake_torques(problem.logs[number], value)
         centre = (first + last) // 2
-        w = np.where(motions[number].stands, 0.0, motions[number].speed_rad_s)
+        w = np.where(motion.stands, 0.0, motion.speed_rad_s)
         middle1.append(w[centre, 0])
         middle2.append(w[centre, 1])
         torque.append(Tb[centre])

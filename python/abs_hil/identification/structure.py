@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .brake_flaws import amounts, fallen
+from .brake_flaws import amounts, brake_torques, fallen, static_torques
 from .linear import _relative, by_windows, linearise, to_rest
 from .parameters import DEAD_TIME, DELAY, FADING, HYSTERESIS
-from .problem import DISTURBANCES, Disturbances, Fit
-from .start import brake_torques, static_torques
+from .problem import DISTURBANCES, Disturbances, Fit, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
 SURE = 5.0
@@ -81,11 +80,10 @@ CAUSES = (
 
 @dataclass
 class Found:
-    """A cause with its coefficient, and by how many standard deviations it moves the parameters."""
+    """A cause with its coefficient and its standard deviation."""
     cause: Cause
     coefficient: float
     sd: float
-    shift: np.ndarray
 
     @property
     def sure(self) -> float:
@@ -111,23 +109,15 @@ def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
     N[np.arange(size), np.arange(size)] += precision
     n[:size] += towards
     free = np.flatnonzero(wide.free)
-    without, _ = _solved(N, n, free)
     out = []
     for number, cause in enumerate(causes):
         place = size + number
         if not N[place, place] > 0.0:
             continue  # nothing in these logs would show it
-        with_it, covariance = _solved(N, n, np.append(free, place))
-        shift = np.zeros(size)
-        shift[free] = with_it[:-1] - without
-        out.append(Found(cause, float(with_it[-1]), float(np.sqrt(covariance[-1, -1])), shift[:len(fit.scale)]))
+        at = np.append(free, place)
+        covariance = inverse(N[np.ix_(at, at)])
+        out.append(Found(cause, float(covariance[-1] @ n[at]), float(np.sqrt(covariance[-1, -1]))))
     return sorted(out, key=lambda one: -one.sure)
-
-
-def _solved(N: np.ndarray, n: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    d = 1 / np.sqrt(np.diag(N)[at])
-    covariance = np.linalg.inv(N[np.ix_(at, at)] * np.outer(d, d)) * np.outer(d, d)
-    return covariance @ n[at], covariance
 
 
 def _signals(fit: Fit) -> list[Signals]:

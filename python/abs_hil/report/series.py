@@ -1,5 +1,6 @@
 """Series of runs: groups of equal values of what was varied, their means, and the figure over them."""
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,37 +73,34 @@ def _values(metric: FigureOfMerit, group: Group, runs: list[RunFiles], surveys: 
     return [value_of(metric, runs[number], surveys[number]) for number in group.runs]
 
 
+def _estimates(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey],
+               ) -> Iterator[tuple[FigureOfMerit, list[tuple[int, float, float, float, float]]]]:
+    """Each figure of merit with number, mean, standard deviation and 95 % interval of the mean of each group."""
+    for metric in merits_shown():
+        if metric.name != 'brake_start_s':
+            yield metric, [_core.estimate_mean(_values(metric, group, runs, surveys)) for group in found.groups]
+
+
 def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
     """One row a group: the means of the figures of merit that the runs have."""
-    columns = []
-    for metric in merits_shown():
-        if metric.name == 'brake_start_s':
-            continue
-        cells = []
-        for group in found.groups:
-            n, mean, _, low, high = _core.estimate_mean(_values(metric, group, runs, surveys))
-            half = f' ± {shown(0.5 * (high - low), metric.decimals)}' if n > 1 else ''
-            cells.append(shown(mean, metric.decimals) + half if n else DASH)
-        if any(cell != DASH for cell in cells):
-            columns.append((metric.heading, cells))
-    rows = [[group.label, str(len(group.runs)), *(cells[number] for _, cells in columns)]
-            for number, group in enumerate(found.groups)]
-    return Table('groups', ['group', 'runs', *(name for name, _ in columns)], rows)
+    header, columns = ['group', 'runs'], []
+    for metric, estimates in _estimates(found, runs, surveys):
+        if any(n for n, *_ in estimates):
+            header.append(metric.heading)
+            columns.append([shown(mean, metric.decimals) + (f' ± {shown(0.5 * (high - low), metric.decimals)}' if n > 1 else '')
+                            if n else DASH for n, mean, _, low, high in estimates])
+    return Table('groups', header, [[group.label, str(len(group.runs)), *(cells[number] for cells in columns)]
+                                    for number, group in enumerate(found.groups)])
 
 
 def series_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
     """Mean, standard deviation and 95 % confidence interval of each figure of merit by group."""
     rows = []
-    for metric in merits_shown():
-        if metric.name == 'brake_start_s':
-            continue
-        for group in found.groups:
-            n, mean, deviation, low, high = _core.estimate_mean(_values(metric, group, runs, surveys))
-            if n == 0:
-                continue
-            digits = metric.decimals + 1
-            rows.append([metric.heading, group.label, str(n), shown(mean, digits), shown(deviation, digits),
-                         DASH if n < 2 else f'{shown(low, digits)} to {shown(high, digits)}'])
+    for metric, estimates in _estimates(found, runs, surveys):
+        digits = metric.decimals + 1
+        rows += [[metric.heading, group.label, str(n), shown(mean, digits), shown(deviation, digits),
+                  DASH if n < 2 else f'{shown(low, digits)} to {shown(high, digits)}']
+                 for group, (n, mean, deviation, low, high) in zip(found.groups, estimates) if n]
     return Table('series', ['figure', ', '.join(found.keys) or 'only the seed varies', 'runs', 'mean', 'standard deviation',
                             '95 % interval of the mean'], rows)
 

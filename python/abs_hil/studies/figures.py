@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import _core
-from ..figures import heading_of
+from ..figures import heading_of, with_unit
 from ..report.model import run_style
 from ..report.plots import numbers
 from .results import StudyResults, _binned
@@ -60,7 +60,7 @@ def title_of(key: str) -> str:
     """What a factor is, with its unit: "peak tyre force / N". A key without a meaning is its own title."""
     meaning, unit = _meanings().get(key, ('', ''))
     short = meaning.removeprefix('simulation: ').partition(',')[0].partition(';')[0].partition(':')[0].strip()
-    return (f'{short} / ({unit})' if ' ' in unit or '/' in unit else f'{short} / {unit}' if unit else short) or key
+    return with_unit(short, unit) or key
 
 
 def numeric_factors(results: StudyResults) -> list[str]:
