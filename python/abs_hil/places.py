@@ -1,6 +1,8 @@
-"""Where the files of this package are that are no Python: tables, libraries for FMUs, the charts of its pages."""
+"""Where the files of this package are that are no Python: tables, libraries for FMUs, the charts of its pages;
+and what to say of a Python package that is not there."""
 import pathlib
 import sys
+import sysconfig
 
 #: of uPlot, which draws the charts of abs_serve and of the lab
 CHARTS_SCRIPT, CHARTS_STYLE = 'uPlot.iife.min.js', 'uPlot.min.css'
@@ -25,3 +27,10 @@ def charts() -> pathlib.Path:
     if not (found / CHARTS_SCRIPT).exists():
         raise ImportError(f'"{found}" lacks {CHARTS_SCRIPT}, which draws the charts')
     return found
+
+
+def how_to_install(package: str) -> str:
+    """The command, after "install it: ". Debian's own Python takes none from pip."""
+    managed = sys.prefix == sys.base_prefix and pathlib.Path(sysconfig.get_path('stdlib'), 'EXTERNALLY-MANAGED').exists()
+    where = ' in an environment of your own (docs/troubleshooting.md, "Installing")' if managed else ''
+    return f'pip install {package}{where}, or scripts/setup_python.sh in the source folder'

@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 from ..files import write_whole
-from ..missing import how_to_install
+from ..places import how_to_install
 
 TARGETS = ('.mcap', '.parquet')
 

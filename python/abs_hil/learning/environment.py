@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector.utils import batch_space
 
-from ..missing import how_to_install
+from ..places import how_to_install
 from .picture import MODES, EpisodePicture
 from .rigs import HIGH, LOW, TRAINING_SEED, Rigs, Task
 

@@ -1,7 +1,7 @@
 """What `render` shows: the episode so far as a picture."""
 import numpy as np
 
-from ..missing import how_to_install
+from ..places import how_to_install
 from .rigs import OBSERVATION
 
 MODES = ('rgb_array',)

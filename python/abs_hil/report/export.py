@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..missing import how_to_install
+from ..places import how_to_install
 from ..rows import TEXTS, read_rows
 from ..run import csv_bytes
 from .files import RunFiles

@@ -7,22 +7,7 @@ import numpy as np
 
 from ..rows import Rows, read_rows
 from .files import RunFiles
-from .model import (
-    REFERENCE,
-    SECOND,
-    Bar,
-    Curve,
-    Figure,
-    Label,
-    Mark,
-    Panel,
-    Shade,
-    Style,
-    axis_around,
-    phase_colour,
-    run_style,
-    thinned,
-)
+from .model import Bar, Curve, Figure, Label, Mark, Panel, Shade, Style, axis_around, phase_colour, run_style, thinned
 from .survey import JUDGED_M_S, Survey, survey
 from .text import short_names
 
@@ -38,6 +23,7 @@ STRIP_CHARACTERS = 16
 MOST_BARS = 60  # of a run; more would be unreadable
 DOUBLE_PX = 165.0
 PX_A_MARK = 34.0
+REFERENCE, SECOND = Style('#000000', (2, 3), 1.1), Style('#D55E00', (7, 4), 1.3)
 TIME = Label('time since the start of the run, <i>t</i> / s', 'time since the start of the run, $t$ / s')
 
 
@@ -76,10 +62,6 @@ class Profile:
     x: np.ndarray
     y: np.ndarray
     relevant: tuple[float, float] = (math.inf, -math.inf)
-
-
-def stretches_for(runs: int) -> int:
-    return min(max(STRETCHES_OF_ALL_RUNS // max(runs, 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
 
 
 def window_of(found: Survey, choice: Choice, braking: bool) -> Window:
@@ -366,7 +348,7 @@ def run_figures(runs: list[RunFiles], options: Options,
                 progress: Callable[[int, int], None] | None) -> tuple[list[Survey], list[Figure]]:
     """The surveys and figures of all runs. Each CSV is read once, and again only if some runs do not brake."""
     surveys, windows, profiles = [], [], []
-    stretches = stretches_for(len(runs))
+    stretches = min(max(STRETCHES_OF_ALL_RUNS // max(len(runs), 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
     for number, run in enumerate(runs, 1):
         rows = read_rows(run.csv)
         found = survey(run, rows)

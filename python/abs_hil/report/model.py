@@ -19,8 +19,6 @@ _RUN_STYLES = (Style('#0072B2', (), 1.5), Style('#E69F00', (14, 3), 1.5), Style(
                Style('#D55E00', (12, 3, 2, 3), 1.5), Style('#CC79A7', (4, 2), 1.5),
                Style('#56B4E9', (12, 3, 2, 3, 2, 3), 1.5), Style('#000000', (2, 2), 1.5))
 STYLES = len(_RUN_STYLES)
-REFERENCE = Style('#000000', (2, 3), 1.1)
-SECOND = Style('#D55E00', (7, 4), 1.3)
 _PHASE_COLOURS = {'idle': '#f1f1f1', 'accelerate': '#d9ecd9', 'coast': '#e2e2f0', 'brake': '#fdfdfd', 'hold': '#e6e6e6',
                   'stopped': '#f3f3f2', 'fault': '#f7d9cc'}
 #: what page.js draws instead of each colour on a dark page

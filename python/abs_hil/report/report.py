@@ -4,22 +4,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core import _core
-from . import paper
+from . import paper, tables
 from .figures import Choice, Options, run_figures
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
 from .page import page
 from .series import SeriesStudy, group_table, series_figure, series_table, study
 from .survey import Survey
-from .tables import (
-    all_notes,
-    differences_table,
-    environment_table,
-    events_table,
-    metrics_table,
-    phases_table,
-    timing_table,
-)
 from .text import clean
 from .timing import timing_figure
 
@@ -91,14 +82,14 @@ def make(request: Request, progress: Callable[[int, int], None] | None = None) -
         {'name': one.name, 'figure': series_figure(number, one, runs, surveys), 'groups': group_table(one, runs, surveys),
          'table': series_table(one, runs, surveys)} for number, one in enumerate(studies, 1)]
     timing = timing_figure(runs)
-    metrics, shared = metrics_table(runs, surveys)
-    events, left_out = events_table(runs, surveys)
+    metrics, shared = tables.metrics_table(runs, surveys)
+    events, left_out = tables.events_table(runs, surveys)
     pairs = paper.pairs_of(runs, surveys) if request.paper else {}
     parts = {'figures': figures, 'series': series, 'timing_figure': timing, 'runs': len(runs), 'title': _title(request, found),
              'version': _core.version, 'lead': paper.lead(runs) if request.paper else _lead(runs),
              'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if request.paper else None,
-             'metrics': metrics, 'shared': shared, 'phases': phases_table(runs, surveys), 'differences': differences_table(runs),
-             'timing': timing_table(runs), 'events': events, 'events_left_out': left_out, 'environment': environment_table(runs),
-             'notes': all_notes(runs, surveys, found.notes)}
+             'metrics': metrics, 'shared': shared, 'phases': tables.phases_table(runs, surveys), 'events': events,
+             'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
+             'environment': tables.environment_table(runs), 'notes': tables.all_notes(runs, surveys, found.notes)}
     every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
     return Report(runs, surveys, every, parts)

@@ -84,6 +84,11 @@ def groups_of(frame: pandas.DataFrame, by: list[str]) -> list[tuple[str, pandas.
             for key, part in frame.groupby(by if len(by) > 1 else by[0], observed=True, sort=False)]
 
 
+def _told_apart(frame: pandas.DataFrame, by: list[str]) -> list[tuple[str, pandas.DataFrame]]:
+    """The groups that have a curve, their names as plotly.js reads them."""
+    return [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+
+
 def _bins(results: StudyResults, factor: str, wanted: float, most: int) -> int:
     """Cells along a factor: its levels, or as many parts of its range as the runs can fill."""
     return MOST_LEVELS if factor in results.levels else int(np.clip(wanted, LEAST_BINS, most))
@@ -135,7 +140,7 @@ def curves(results: StudyResults, metric: str) -> Drawing | None:
     frame = results.completed([*by, *factors, metric])
     if not factors or not frame[metric].notna().any():
         return None
-    groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+    groups = _told_apart(frame, by)
     points = int(results.columns(['point'])['point'].nunique())
     cells = []
     for factor in factors:
@@ -167,7 +172,7 @@ def maps(results: StudyResults, metric: str) -> Drawing | None:
     frame = results.columns([*dict.fromkeys([*by, *itertools.chain(*pairs)]), 'result', metric])
     if not pairs or not frame[metric].notna().any():
         return None
-    groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+    groups = _told_apart(frame, by)
     wanted = np.sqrt(len(frame) / len(groups) / 2)
     cells = []
     for (name, part), (x, y) in itertools.product(groups, pairs):
@@ -209,7 +214,7 @@ def distributions(results: StudyResults, metrics: list[str]) -> Drawing | None:
             continue
         edges = np.linspace(values.min(), values.max(), int(np.clip(np.sqrt(len(values)), 5, BINS_OF_DISTRIBUTION)) + 1)
         cell = Cell([], heading_of(metric), 'runs')
-        groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+        groups = _told_apart(frame, by)
         for number, (name, part) in enumerate(groups):
             counts = np.histogram(part[metric].dropna(), edges)[0]
             cell.traces.append({

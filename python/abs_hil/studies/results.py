@@ -14,8 +14,8 @@ import numpy as np
 
 from ..core import _core
 from ..files import write_whole
-from ..missing import how_to_install
 from ..nesting import parse_json
+from ..places import how_to_install
 
 if TYPE_CHECKING:
     import pandas
