@@ -16,18 +16,7 @@ from ..core import _core
 from .linear import CONVERGED, _measure, disc_waves_rad, filtered, run_filter, solved, step, to_rest
 from .logs import motion_of
 from .parameters import DELAY, RATE_LIMIT
-from .problem import (
-    DISTURBANCES,
-    LARGEST_QUIET_RMS,
-    QUIET,
-    WINDOW_DISTURBED_S,
-    WINDOW_S,
-    Disturbances,
-    Fit,
-    Piece,
-    Problem,
-    pieces_of,
-)
+from .problem import LARGEST_QUIET_RMS, QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
 from .start import first_values
 
 #: rounds of the homotopy: disturbances, number of iterations
@@ -86,7 +75,8 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         return []
     if len(gaps) > most:  # evenly chosen ones; a later call looks closer
         gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
-    affected = [_has_duties(problem, piece, edges[0], edges[-1]) for piece in fit.pieces]
+    acting = [problem.logs[piece.log].brake_pwm[max(piece.rows.start - 1, 0):piece.rows.stop] for piece in fit.pieces]
+    affected = [bool(np.any((duty >= edges[0]) & (duty <= edges[-1]))) for duty in acting]
     cost_of = other_costs(fit, disturbances, affected)
     tried = []
     for begin, end in gaps:
@@ -114,11 +104,6 @@ def likely_u0(fit: Fit, disturbances: Disturbances,
         if lower and upper:
             break
     return gaps
-
-
-def _has_duties(problem: Problem, piece: Piece, least: float, most: float) -> bool:
-    duty = problem.logs[piece.log].brake_pwm[max(piece.rows.start - 1, 0):piece.rows.stop]
-    return bool(np.any((duty >= least) & (duty <= most)))
 
 
 def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None,
@@ -158,13 +143,13 @@ def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], N
     return fit
 
 
-def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 12) -> Fit:
+def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
     """The rest of the rounds, then without disturbances until nothing moves."""
     for number, (disturbances, count) in enumerate(ROUNDS[1:]):
         for _ in range(count):
             step(fit, disturbances, check)
         search_u0(fit, disturbances, 0.004 / 4**number, 9, check)
-    _to_rest(fit, check, most)
+    _undisturbed(fit, check)
     for _ in range(2):
         if not fit.rms_counts > LARGEST_QUIET_RMS:
             break
@@ -174,17 +159,17 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
         search_u0(moved, ROUNDS[-1][0], 0.001, 9, check)
         if moved.values['u0'] == fit.values['u0']:
             break
-        _to_rest(moved, check, most)
+        _undisturbed(moved, check)
         if not moved.rms_counts < fit.rms_counts:
             break
         fit = moved
     return fit
 
 
-def _to_rest(fit: Fit, check: Callable[[], None], most: int) -> None:
+def _undisturbed(fit: Fit, check: Callable[[], None]) -> None:
     """Steps without disturbances until nothing moves, or until it shows that the logs are of a rig that wanders."""
     before, stalls = np.inf, 0
-    for _ in range(most):
+    for _ in range(12):
         moved = step(fit, QUIET, check)
         # The residual settles last: past the peak the states need some rounds more than the parameters.
         if moved < CONVERGED or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
@@ -208,16 +193,10 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
         search_u0(fit, present, 0.003 / 2**round_number, 7, check)
         if round_number < 3:
             present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
-            say(f'disturbances: {describe(present)}')
+            say(f'disturbances: {present}')
     if not moved < CONVERGED:
         to_rest(fit, present, 6, check)
     return fit
-
-
-def describe(disturbances: Disturbances) -> str:
-    factors = ', '.join(f'{name} {100 * sd:.2g} %' for name, sd in zip(DISTURBANCES[:3], disturbances.sd))
-    bearings = ', '.join(f'{name} {1e3 * sd:.2g} mN m' for name, sd in zip(DISTURBANCES[3:], disturbances.sd[3:]))
-    return f'{factors}, {bearings}; over {disturbances.time_constant_s[0]:.2g} s'
 
 
 def likeliest_disturbances(fit: Fit, guess: Disturbances, evaluations: int) -> Disturbances:

@@ -1,12 +1,11 @@
 """What identify() found: estimates with their intervals, statuses and combinations, and which logs disagree."""
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from . import discs, intervals, rate_limit, structure
-from .fit import describe
 from .logs import Log
 from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, FORMS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
@@ -32,6 +31,14 @@ class Estimate:
     high: float | None
     status: str
     unit: str
+
+    @classmethod
+    def fixed(cls, value: float, unit: str) -> Self:
+        return cls(value, value, value, 'fixed', unit)
+
+    def withdraw(self) -> None:
+        """The logs do not tell it."""
+        self.status, self.low, self.high = 'not-identifiable', None, None
 
 
 @dataclass
@@ -101,24 +108,21 @@ def leave_form_open(found: Identified) -> None:
     found.misfit = ('the logs do not tell the form of tyre and load. Run: slip-sweep or locked-stop, or name it with --form')
     found.notes.insert(0, f'{found.misfit}. The tyre has no interval, and no model.toml is written')
     for p in FORMS[found.form].tyre:
-        found.parameters[p.key].status = 'not-identifiable'
-        found.parameters[p.key].low = found.parameters[p.key].high = None
+        found.parameters[p.key].withdraw()
     found.combinations.pop('theta_B_C_N', None)
 
 
 def without_intervals(found: Identified) -> None:
     for estimate in found.parameters.values():
         if estimate.status != 'fixed':
-            estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None
+            estimate.withdraw()
     found.combinations.clear()
 
 
 def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     fit, spread, disturbances = finished.fit, finished.spread, finished.disturbances
     problem = fit.problem
-    parameters: dict[str, Estimate] = {}
-    for key, unit in GIVEN.items():
-        parameters[key] = Estimate(problem.given[key], problem.given[key], problem.given[key], 'fixed', unit)
+    parameters = {key: Estimate.fixed(problem.given[key], unit) for key, unit in GIVEN.items()}
     cures: dict[str, list[str]] = {}
     relative: dict[str, float] = {}
     for i, p in enumerate(problem.parameters):
@@ -126,7 +130,7 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
         if p.acts == 'reading':
             continue
         if p.key in problem.fixed:
-            parameters[p.key] = Estimate(value, value, value, 'fixed', p.unit)
+            parameters[p.key] = Estimate.fixed(value, p.unit)
             continue
         if p.key == 'u0':
             parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
@@ -169,7 +173,7 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     wanted = [f'the logs do not tell {", ".join(keys)}{_run(cure, problem)}' for cure, keys in cures.items() if cure]
     notes += wanted
     if disturbances is not None:
-        notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
+        notes.append(f'the rig wanders ({disturbances}); the intervals count with it')
     return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
                       list(problem.logs), fit, spread, wanted=wanted)
 
@@ -204,8 +208,7 @@ def _no_rate_limit(fit: Fit, notes: list[str], cures: dict[str, list[str]]) -> E
     """The logs show none: 0, the lag alone. A larger one than the logs' fastest change cannot be seen."""
     problem = fit.problem
     if RATE_LIMIT.key in problem.fixed:
-        value = problem.fixed[RATE_LIMIT.key]
-        return Estimate(value, value, value, 'fixed', RATE_LIMIT.unit)
+        return Estimate.fixed(problem.fixed[RATE_LIMIT.key], RATE_LIMIT.unit)
     if not any(log.brake_pwm.any() for log in problem.logs):
         cures.setdefault(RATE_LIMIT.cure, []).append(RATE_LIMIT.key)
         return Estimate(0.0, None, None, 'not-identifiable', RATE_LIMIT.unit)

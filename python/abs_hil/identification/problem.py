@@ -1,10 +1,8 @@
 """What a fit works on: the logs in windows, the plant's form, the present values and their normal equations."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -30,8 +28,13 @@ class Disturbances:
     time_constant_s: np.ndarray
 
     @classmethod
-    def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Disturbances:
+    def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Self:
         return cls(np.array([factor, factor, factor, torque_Nm, torque_Nm]), np.full(5, time_constant_s))
+
+    def __str__(self) -> str:
+        factors = ', '.join(f'{name} {100 * sd:.2g} %' for name, sd in zip(DISTURBANCES[:3], self.sd))
+        bearings = ', '.join(f'{name} {1e3 * sd:.2g} mN m' for name, sd in zip(DISTURBANCES[3:], self.sd[3:]))
+        return f'{factors}, {bearings}; over {self.time_constant_s[0]:.2g} s'
 
 
 QUIET = Disturbances.of(0.0, 0.0, 1.0)
@@ -73,7 +76,7 @@ class Problem:
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
-           drifts: Sequence[str] = (), discs: Sequence[str] = ()) -> Problem:
+           drifts: Sequence[str] = (), discs: Sequence[str] = ()) -> Self:
         base = base_options(form, start)
         values = _core.PlantOptions(options(plant=start)).values()
         counts_per_rev = int(values['encoder_counts_per_rev'])
@@ -162,7 +165,7 @@ class Fit:
     moved: Move | None = None
     last_step: float = 0.0
 
-    def copy(self, **changes: Any) -> Fit:
+    def copy(self, **changes: Any) -> Self:
         """A fit that can go on without this one."""
         return dataclasses.replace(self, **{'pieces': [dataclasses.replace(piece) for piece in self.pieces], **changes})
 

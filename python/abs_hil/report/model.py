@@ -1,8 +1,7 @@
 """A figure as data, which the page (plotly) and the picture files (matplotlib) draw alike."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -43,10 +42,10 @@ class Label:
     html: str
     math: str  # with matplotlib's $...$
 
-    @staticmethod
-    def plain(text: str) -> Label:
+    @classmethod
+    def plain(cls, text: str) -> Self:
         """Text from a file, without markup."""
-        return Label(text.replace('&', '&amp;').replace('<', '&lt;').replace('>', '&gt;'), text.replace('$', r'\$'))
+        return cls(text.replace('&', '&amp;').replace('<', '&lt;').replace('>', '&gt;'), text.replace('$', r'\$'))
 
 
 @dataclass

@@ -25,7 +25,7 @@ class Group:
     """Runs of a series that share the values of the varied keys."""
     label: str
     runs: list[int]
-    value: float | None  # of the first varied key, if it is a number
+    value: float  # of the first varied key; NaN if it is no number
 
 
 @dataclass
@@ -37,19 +37,11 @@ class SeriesStudy:
     @property
     def by_value(self) -> bool:
         """True if the groups stand at their values on the x axis, false if at 1, 2, 3, ..."""
-        return len(self.keys) == 1 and len(self.groups) > 1 and all(group.value is not None for group in self.groups)
+        return len(self.keys) == 1 and len(self.groups) > 1 and all(math.isfinite(group.value) for group in self.groups)
 
     @property
     def places(self) -> list[float]:
-        return [group.value if self.by_value and group.value is not None else float(number)
-                for number, group in enumerate(self.groups, 1)]
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+        return [group.value if self.by_value else float(number) for number, group in enumerate(self.groups, 1)]
 
 
 def study(series: SeriesFiles, runs: list[RunFiles]) -> SeriesStudy:
@@ -61,11 +53,11 @@ def study(series: SeriesFiles, runs: list[RunFiles]) -> SeriesStudy:
             parts = [f'{key.rpartition(".")[2]} = {value}' for key, value in zip(found.keys, values)][:MOST_KEYS_IN_LABEL]
             label = ', '.join(parts + (['…'] if len(found.keys) > MOST_KEYS_IN_LABEL else []))
             known[values] = Group(clean(label, LABEL_CHARACTERS) if label else 'all runs', [],
-                                  _number(values[0]) if values else None)
+                                  runs[number].config_number(found.keys[0], math.nan) if values else math.nan)
         known[values].runs.append(number)
     found.groups = list(known.values())
-    if all(group.value is not None for group in found.groups):
-        found.groups.sort(key=lambda group: group.value or 0.0)
+    if all(math.isfinite(group.value) for group in found.groups):
+        found.groups.sort(key=lambda group: group.value)
     return found
 
 

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 
+from ..run import stretches
 from .files import PARTS, RunFiles
 from .model import STYLES, Curve, Figure, Label, Panel, run_style
 
@@ -22,24 +23,13 @@ def _edges(last_us: int) -> np.ndarray:
 
 def outline(counts: np.ndarray, total: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
     """Share of the cycles by duration as the outline of a bar chart; no outline over empty bins."""
-    points: list[tuple[float, float]] = []
     edges = _edges(len(counts))
-    for first, last in zip(edges, edges[1:]):
-        share = float(counts[first:last].sum()) / total
-        left, right = (0.5 if first == 0 else float(first)), float(last)
-        is_open = bool(points) and not math.isnan(points[-1][1])
-        if share <= 0.0:
-            if is_open:
-                points += [(left, floor), (left, math.nan)]
-            continue
-        if not is_open:
-            points.append((left, floor))
-        points += [(left, share), (right, share)]
-    if points and not math.isnan(points[-1][1]):
-        points.append((points[-1][0], floor))
-    if points and math.isnan(points[-1][1]):
-        points.pop()
-    return np.array([x for x, _ in points]), np.array([y for _, y in points])
+    ends = np.maximum(edges, 0.5)
+    shares = np.array([counts[first:last].sum() for first, last in zip(edges, edges[1:])]) / total
+    bars = stretches(shares > 0.0)
+    x = [np.append(np.repeat(ends[a:b + 1], 2), ends[b]) for a, b in bars]
+    y = [np.concatenate([[floor], np.repeat(shares[a:b], 2), [floor, math.nan]]) for a, b in bars]
+    return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
 
 
 def timing_figure(runs: list[RunFiles]) -> Figure | None:
