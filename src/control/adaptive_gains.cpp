@@ -5,7 +5,6 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
-#include <string_view>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/option_check.hpp"
@@ -54,28 +53,6 @@ Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& 
   return symmetric;
 }
 
-namespace {
-
-void look_at(const AdaptiveOptions& gains, const char* prefix, std::vector<std::string>& found) {
-  if (gains.q12 != 0.0) {
-    found.push_back(
-        rig::formatted("%sq12 = %g has no effect: the laws use B'P of PA + A'P = -2Q, which does not "
-                       "contain it; use q11 and q22",
-                       prefix, gains.q12));
-  }
-}
-
-}  // namespace
-
-std::vector<std::string> silent_settings(const ControlOptions& options) {
-  std::vector<std::string> found;
-  if (options.controller == "adaptive") look_at(options.adaptive, "control.adaptive.", found);
-  if (options.controller == "adaptive-actuator") {
-    look_at(options.adaptive_actuator.law, "control.adaptive_actuator.", found);
-  }
-  return found;
-}
-
 const AdaptiveOptions& checked(const AdaptiveOptions& options) {
   // The bounds of theta are not checked. The paper's proofs have no projection, and tests of them use bounds outside
   // the ranges of the configuration.
@@ -91,7 +68,7 @@ const AdaptiveOptions& checked(const AdaptiveOptions& options) {
 paper::Weights<double> paper_weights(const AdaptiveOptions& options) {
   const AdaptiveOptions& o = checked(options);
   Eigen::Matrix2d Q;
-  Q << o.q11, o.q12, o.q12, o.q22;
+  Q << o.q11, 0.0, 0.0, o.q22;
   const Eigen::Matrix2d A = error_dynamics_matrix(o.ks0, o.ks1);
   // Q is judged first, by the solution for gains that are sound.
   static_cast<void>(solve_lyapunov(error_dynamics_matrix(1.0, 1.0), Q));
@@ -104,7 +81,7 @@ paper::Weights<double> paper_weights(const AdaptiveOptions& options) {
         "-2Q has no solution that a double can hold; bring ks1 nearer to sqrt(ks0) = %g 1/s",
         o.ks0, o.ks1, std::sqrt(o.ks0)));
   }
-  return {.p11 = P(0, 0), .p12 = P(0, 1), .p22 = P(1, 1), .q11 = o.q11, .q12 = o.q12, .q22 = o.q22};
+  return {.p11 = P(0, 0), .p12 = P(0, 1), .p22 = P(1, 1), .q11 = o.q11, .q22 = o.q22};
 }
 
 paper::Gains<double> paper_gains(const AdaptiveOptions& options) {

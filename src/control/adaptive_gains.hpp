@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <string>
-#include <vector>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/paper_laws.hpp"
@@ -13,9 +11,6 @@ namespace abs_hil::control {
 /// P of the Lyapunov equation P A + A' P = -2 Q, symmetric and positive definite. Throws std::invalid_argument if Q is
 /// not finite, symmetric and positive definite, or if A is not stable (no such P exists then). Not real-time safe.
 [[nodiscard]] Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& Q);
-
-/// Settings of the chosen controller that cannot do what they seem to ask for, one sentence each, for the user.
-[[nodiscard]] std::vector<std::string> silent_settings(const ControlOptions& options);
 
 /// Returns the options unchanged. Throws std::invalid_argument, naming the option, if gamma, ka1 or zeta0 is out of its
 /// range or theta_min_N > theta_max_N. Not real-time safe.

@@ -51,7 +51,6 @@ class BadInput(ProgramTest):
     def test_values_that_do_not_go_together(self):
         self.refused(['--set', 'control.adaptive.theta_min_N=60', '--set', 'control.adaptive.theta_max_N=50'],
                      ['theta_min_N', 'theta_max_N'])
-        self.refused(['--set', 'control.adaptive.q12=5'], ['Q'])
 
     def test_road(self):
         self.refused(['--set', 'plant.friction_profile=time: 1; 0.5 at soon'],

@@ -25,7 +25,7 @@ struct LyapunovRun {
 LyapunovRun lyapunov_run(const bench::Setup& s) {
   const auto& o = s.options.adaptive;
   const double p12 = o.q11 / o.ks0, p22 = (o.q22 + p12) / o.ks1;  // PA + A'P = -2Q by hand
-  const double p11 = o.ks1 * p12 + o.ks0 * p22 - 2 * o.q12;
+  const double p11 = o.ks1 * p12 + o.ks0 * p22;
   const auto run = bench::brake(s, "adaptive");
   LyapunovRun result;
   double I = 0.0, before = 0.0;
@@ -36,8 +36,7 @@ LyapunovRun lyapunov_run(const bench::Setup& s) {
     const double error = s.rig.tyre.theta_N - tick.output.theta_est_N;
     const double phi = std::sin(s.rig.tyre.C * std::atan(s.rig.tyre.B * tick.slip));
     result.V.push_back((p11 * I * I + 2 * p12 * I * e + p22 * e * e + error * error / o.gamma) / 2);
-    result.V_rate_expected.push_back(-(o.q11 * I * I + 2 * o.q12 * I * e + o.q22 * e * e) -
-                                     o.ka1 * phi * error * error);
+    result.V_rate_expected.push_back(-(o.q11 * I * I + o.q22 * e * e) - o.ka1 * phi * error * error);
     result.phi.push_back(phi);
   }
   return result;

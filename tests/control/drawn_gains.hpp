@@ -13,7 +13,6 @@ void draw_gains(abs_hil::control::AdaptiveOptions& options, Between between) {
   options.ka1 = between(0.3, 3.0);
   options.q11 = between(0.5, 3.0);
   options.q22 = between(0.5, 3.0);
-  options.q12 = between(-0.4, 0.4);
   options.theta_min_N = -1000.0;
   options.theta_max_N = 1000.0;
 }

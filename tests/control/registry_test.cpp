@@ -73,7 +73,7 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
   refused("adaptive", [](auto& o) { o.adaptive.ka1 = -1.0; });
   refused("adaptive", [](auto& o) { o.adaptive.gamma = o.adaptive.ka1 = 1e-200; });
   refused("adaptive", [](auto& o) { o.adaptive.ks0 = 1e-300; });
-  refused("adaptive", [](auto& o) { o.adaptive.q12 = 2.0; });
+  refused("adaptive", [](auto& o) { o.adaptive.q22 = -2.0; });
   refused("adaptive", [](auto& o) { o.adaptive.theta_min_N = 200.0; });
   refused("adaptive", [=](auto& o) { o.adaptive.zeta0 = nan; });
   refused("adaptive", [](auto& o) { o.rate_Hz = 0.0; });

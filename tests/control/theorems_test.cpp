@@ -49,14 +49,14 @@ bench::Setup any_rig() {
 struct Quadratic {
   double p11, p12, p22;
   explicit Quadratic(const control::AdaptiveOptions& o)
-      : p11{o.ks1 * o.q11 / o.ks0 + o.ks0 * (o.q22 + o.q11 / o.ks0) / o.ks1 - 2 * o.q12},
+      : p11{o.ks1 * o.q11 / o.ks0 + o.ks0 * (o.q22 + o.q11 / o.ks0) / o.ks1},
         p12{o.q11 / o.ks0},
         p22{(o.q22 + o.q11 / o.ks0) / o.ks1} {}
   /// Least eigenvalue of inverse(P) Q: the largest c with x'Qx >= c x'Px.
   [[nodiscard]] double slowest(const control::AdaptiveOptions& o) const {
     const double det_P = p11 * p22 - p12 * p12;
-    const double trace = (p22 * o.q11 - 2 * p12 * o.q12 + p11 * o.q22) / det_P;
-    const double det = (o.q11 * o.q22 - o.q12 * o.q12) / det_P;
+    const double trace = (p22 * o.q11 + p11 * o.q22) / det_P;
+    const double det = (o.q11 * o.q22) / det_P;
     return (trace - std::sqrt(trace * trace - 4 * det)) / 2;
   }
   [[nodiscard]] double operator()(double I, double e) const { return p11 * I * I + 2 * p12 * I * e + p22 * e * e; }
@@ -156,7 +156,7 @@ Trace trace_of(const bench::Setup& s, const bench::Result& run, bool lag) {
     before = e;
     const double error = s.rig.tyre.theta_N - tick.output.theta_est_N, phi = phi_at(s, tick.slip);
     double V = quadratic(I, e) + error * error / o.gamma;
-    double promised = -(o.q11 * I * I + 2 * o.q12 * I * e + o.q22 * e * e) - o.ka1 * phi * error * error;
+    double promised = -(o.q11 * I * I + o.q22 * e * e) - o.ka1 * phi * error * error;
     if (lag) {
       const double drift = -w.r1_m / w.J1_kg_m2 * (w.d1_Nms_rad * tick.omega1 + w.M10_Nm) +
                            (1 - s.options.slip_ref) * w.r2_m / w.J2_kg_m2 * (w.d2_Nms_rad * tick.omega2 + w.M20_Nm);
@@ -222,7 +222,6 @@ TEST_CASE(
     o.ks1 = between(200.0, 300.0);
     o.ks0 = 0.2 * o.ks1 * o.ks1;
     o.q11 = o.ks0;
-    o.q12 = 0.0;
     o.q22 = 1.0;
     const double theta0_N = s.rig.tyre.theta_N, period_s = between(0.05, 0.2);
     const double phi_min = 0.5 * phi_at(s, s.options.slip_ref);

@@ -28,11 +28,8 @@ struct AdaptiveOptions {
   ABS_HIL_OPTION(double, zeta0, 0.0, .unit = "N", .meaning = "zeta(0) of (17)", .range = rig::between(-500, 500),
                  .search = rig::search_linearly(0, 40), .start_value = true);
   // The lower ends keep gamma ka1 and the solution of the Lyapunov equation away from what a double cannot hold.
-  /// Q is symmetric and positive definite.
+  /// Q = diag(q11, q22). An element beside the diagonal would act on no law: B'P does not contain it.
   ABS_HIL_OPTION(double, q11, 1.0, .unit = "1/s^3", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
-  /// The laws use B'P, which does not contain q12 (src/control/adaptive_gains.hpp). The key stays for old files.
-  ABS_HIL_OPTION(double, q12, 0.0, .unit = "1/s^2", .meaning = "Q of PA + A'P = -2Q; has no effect on any law",
-                 .range = rig::between(-1e6, 1e6));
   ABS_HIL_OPTION(double, q22, 1.0, .unit = "1/s", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
   /// The estimate is projected onto [theta_min_N, theta_max_N].
   ABS_HIL_OPTION(double, theta_min_N, 0.0, .unit = "N", .meaning = "least theta the estimate may take",

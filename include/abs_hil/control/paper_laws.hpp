@@ -40,7 +40,7 @@ struct Gains {
 /// P and Q of the Lyapunov equation PA + A'P = -2 Q of Theorem 3.1, both symmetric.
 template <Scalar S>
 struct Weights {
-  S p11{0.0}, p12{0.0}, p22{0.0}, q11{0.0}, q12{0.0}, q22{0.0};
+  S p11{0.0}, p12{0.0}, p22{0.0}, q11{0.0}, q22{0.0};
 };
 
 /// State of (17), and its derivative.
@@ -122,7 +122,7 @@ struct Laws {
   }
   // V' = -[I; e_v]' Q [I; e_v] - ka1 phi theta_err^2, for a constant theta and phi > 0
   static constexpr S V_dot(const Gains<S>& g, const Weights<S>& w, S I, S e_v, S phi, S theta_err) {
-    return -(w.q11 * I * I + 2.0 * w.q12 * I * e_v + w.q22 * e_v * e_v) - g.ka1 * phi * theta_err * theta_err;
+    return -(w.q11 * I * I + w.q22 * e_v * e_v) - g.ka1 * phi * theta_err * theta_err;
   }
   // NOLINTEND(modernize-use-nodiscard)
 };
