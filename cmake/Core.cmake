@@ -5,4 +5,4 @@
 # ABS_HIL_CORE_ONLY builds nothing else: rooms and Python module, with header-only libraries, for scripts/wheels.sh.
 option(ABS_HIL_CORE_ONLY "Build the simulation core and its Python module alone, for wheels of any platform" OFF)
 
-set(ABS_HIL_ROOMS_BEYOND_CORE cli emulator diagnosis guardian commands replay)
+set(ABS_HIL_ROOMS_BEYOND_CORE cli emulator diagnosis guardian commands replay program)

@@ -17,7 +17,7 @@ set(ABS_HIL_ROOM_TABLE
   "analysis | metrics, summary | rig"
   "run_folder | run folders: layout, environment, checksums, the index of a series | files rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | files rig driver runtime telemetry"
-  "config | configuration keys from the option rows, files, experiment files: rows, reader, schema, plan | files rig control plant_sim driver runtime experiment"
+  "config | configuration keys from the option rows, files, experiment files: rows, reader, schema, plan, the merge to the settings of a run | files rig control plant_sim driver runtime experiment"
   "guardian | the guard of the outputs and its companions, the lease and the own guardian as a run sees them, the program abs_guardian | cli files rig control plant_sim driver runtime experiment lcmtypes telemetry config"
   "run | one run, put together from its settings in one place: driver, faults, plan, logic, gate, ring, metrics, in real time, in virtual time or cycle by cycle | files rig control plant_sim driver driver_sim runtime experiment analysis config"
   "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis run_folder config run"

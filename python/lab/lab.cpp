@@ -19,8 +19,8 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
+#include "config/merge.hpp"
 #include "files.hpp"
-#include "program/command_line.hpp"
 #include "rig/gate_counts.hpp"
 #include "rig/record_sink.hpp"
 #include "run/run_summary.hpp"
@@ -203,7 +203,7 @@ Answer& answer() {
 Json run(const std::vector<std::string>& words) {
   Answer& a = answer();
   a.rows.emplace();
-  const program::RunRequest request = program::merge(program::options_of(words));
+  const config::Configuration request = config::merge(config::sources_of(words));
   run::require_simulated(request.settings, *request.script);
   const run::Prepared prepared(request.settings, *request.script);
   run::Run run(prepared);
@@ -230,7 +230,7 @@ Json run(const std::vector<std::string>& words) {
           {"events", a.rows->events(a.names)},
           {"figures", std::move(figures)},
           {"summary", analysis::to_json(summary)},
-          {"config", Json::parse(request.config_json)}};
+          {"config", Json::parse(request.json)}};
 }
 
 template <class Work>

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "abs_hil/rig/state_bytes.hpp"
-#include "program/command_line.hpp"
+#include "config/merge.hpp"
 
 namespace abs_hil::python {
 
@@ -27,12 +27,13 @@ void add_studies(py::module_& module);
 void add_tables(py::module_& module);
 
 /// The options of a run from the arguments of abs_hil.simulate: text, or lists of text.
-[[nodiscard]] program::RunOptions run_options(const py::dict& arguments);
+[[nodiscard]] config::Sources run_options(const py::dict& arguments);
 
 class PythonControllerScope;
 /// Makes the run that `request` makes, outside of Python's lock: its columns, its signals, its summary as JSON, its
 /// configuration as TOML. @param scope  of a controller in Python, or null
-[[nodiscard]] py::tuple recorded_run(const std::function<program::RunRequest()>& request, PythonControllerScope* scope);
+[[nodiscard]] py::tuple recorded_run(const std::function<config::Configuration()>& request,
+                                     PythonControllerScope* scope);
 
 /// A NumPy array that takes over the values.
 template <class Value>

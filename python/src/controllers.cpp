@@ -98,7 +98,7 @@ class PythonController final : public control::SlipController {
 class LawByHand {
  public:
   LawByHand(const py::dict& arguments) {
-    const program::RunRequest request = program::merge(run_options(arguments));
+    const config::Configuration request = config::merge(run_options(arguments));
     controller_ = control::make_controller(request.settings.control.controller,
                                            {request.settings.control, request.settings.model});
     name_ = request.settings.control.controller;

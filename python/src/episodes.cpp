@@ -137,9 +137,9 @@ class Episodes {
   /// Begins a new episode of one rig. @param vary  what varies, by plant `index` of the series `seed`
   void reset(std::size_t rig, const py::dict& arguments, const std::string& vary, std::uint64_t seed,
              std::uint64_t index, bool law) {
-    const program::RunOptions options = run_options(arguments);
+    const config::Sources options = run_options(arguments);
     const py::gil_scoped_release release;
-    const program::RunRequest request = program::merge(options);
+    const config::Configuration request = config::merge(options);
     const study::Perturbation drawn = study::draw(study::Variation::parse(vary), seed, index);
     episodes_.at(rig) = std::make_unique<Episode>(request.settings, study::perturbed(request.settings.plant, drawn),
                                                   drawn.sensor_seed, law);

@@ -71,7 +71,7 @@ py::dict model_of(const config::Settings& s, std::string_view kind, const std::s
 
 /// The controller that the options name, else the rig.
 py::dict fmu_model(const py::dict& options) {
-  const config::Settings s = program::merged_settings(run_options(options));
+  const config::Settings s = config::merged_settings(run_options(options));
   if (s.seed > 2'147'483'647) throw std::invalid_argument("run.seed: an FMU takes at most 2147483647");
   if (!options.contains("controller")) return model_of<fmu::PlantModel>(s, fmu::plant_kind, s.plant_name);
   if (control::is_controller_file(s.control.controller)) {

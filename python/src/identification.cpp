@@ -58,7 +58,7 @@ py::array_t<std::int32_t> encoder_counts(const PlantOptions& base, const Array& 
 
 void add_identification(py::module_& module) {
   py::class_<PlantOptions>(module, "PlantOptions")
-      .def(py::init([](const py::dict& arguments) { return program::merged_settings(run_options(arguments)).plant; }))
+      .def(py::init([](const py::dict& arguments) { return config::merged_settings(run_options(arguments)).plant; }))
       .def("with_values", [](const PlantOptions& options, const Values& values) { return with(options, values); })
       .def("values", [](const PlantOptions& options) {
         py::dict all;

@@ -20,7 +20,7 @@ using plant_sim::Plant;
 using plant_sim::PlantState;
 
 plant_sim::PlantOptions options_of(const py::dict& arguments) {
-  return program::merge(run_options(arguments)).settings.plant;
+  return config::merge(run_options(arguments)).settings.plant;
 }
 
 /// Throws std::invalid_argument, which Python sees as ValueError.

@@ -52,18 +52,18 @@ class PythonPoll {
 };
 
 /// The request with the plant number `index` that `abs_hil compare` draws. The model stays.
-program::RunRequest on_varied_plant(config::Settings settings, const std::string& vary, std::uint64_t seed,
-                                    std::uint64_t index) {
+config::Configuration on_varied_plant(config::Settings settings, const std::string& vary, std::uint64_t seed,
+                                      std::uint64_t index) {
   const study::Perturbation drawn = study::draw(study::Variation::parse(vary), seed, index);
   settings.plant = study::perturbed(settings.plant, drawn);
   settings.sensor_seed = std::to_string(drawn.sensor_seed);
-  return program::request_of(std::move(settings), {});
+  return config::configuration_of(std::move(settings));
 }
 
 /// @param varied  what varies, the seed of the plants and the number of one: a run on that plant
 py::tuple simulate(const py::dict& arguments, py::object controller,
                    const std::optional<std::tuple<std::string, std::uint64_t, std::uint64_t>>& varied) {
-  program::RunOptions options = run_options(arguments);
+  config::Sources options = run_options(arguments);
   std::optional<PythonControllerScope> scope;
   if (!controller.is_none()) {
     scope.emplace(std::move(controller));
@@ -71,9 +71,9 @@ py::tuple simulate(const py::dict& arguments, py::object controller,
   }
   return recorded_run(
       [&] {
-        if (!varied) return program::merge(options);
+        if (!varied) return config::merge(options);
         const auto& [vary, seed, index] = *varied;
-        return on_varied_plant(program::merged_settings(options), vary, seed, index);
+        return on_varied_plant(config::merged_settings(options), vary, seed, index);
       },
       scope ? &*scope : nullptr);
 }
@@ -96,7 +96,7 @@ std::string refusal(const Work& work) {
 
 /// Runs one job whose controller is a Python object, in this thread. Returns why its options cannot be used, and throws
 /// what the controller raised. Called without Python's lock.
-std::string run_with_law(const py::object& law, program::RunOptions options,
+std::string run_with_law(const py::object& law, config::Sources options,
                          const std::function<study::Job(const config::Settings&)>& job_of, study::RunResult& result) {
   std::optional<PythonControllerScope> scope;
   const auto locked = [](const auto& work) {
@@ -106,7 +106,7 @@ std::string run_with_law(const py::object& law, program::RunOptions options,
   locked([&] { scope.emplace(law); });
   options.controller = python_controller;
   std::string unusable = refusal([&] {
-    const config::Settings settings = program::merged_settings(options);
+    const config::Settings settings = config::merged_settings(options);
     const study::Job job = job_of(settings);
     result = study::simulate(run::Prepared(settings), job.plant, job.seed);
   });
@@ -124,7 +124,7 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
                        std::uint64_t seed, std::size_t threads, Interruptible::Progress progress,
                        const std::vector<py::object>& laws) {
   const study::Variation variation = study::Variation::parse(vary);
-  std::vector<program::RunOptions> typed;
+  std::vector<config::Sources> typed;
   for (const py::dict& arguments : options) typed.push_back(run_options(arguments));
   std::vector<bool> in_python;
   for (const py::object& law : laws) in_python.push_back(!law.is_none());
@@ -136,7 +136,7 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
     std::vector<config::Settings> settings(typed.size());
     std::vector<std::string> unusable(typed.size());
     study::for_each_index(typed.size(), threads, [&](std::size_t i) {
-      if (!in_python[i]) unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
+      if (!in_python[i]) unusable[i] = refusal([&] { settings[i] = config::merged_settings(typed[i]); });
       loop.after(0, jobs.size());
     });
     std::atomic<std::size_t> finished{0};
@@ -195,19 +195,21 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
 /// The runs of a series in its order: for each its varied values as JSON, its seed, and what `simulate` returns. All
 /// configurations are checked before the first run.
 py::list simulate_series(const py::dict& arguments) {
-  const program::RunOptions common = run_options(arguments);
-  const program::RunRequest base = program::merge(common);
+  const config::Sources common = run_options(arguments);
+  const config::Configuration base = config::merge(common);
   const std::vector<config::SeriesMember> members = config::members_of(*base.script, base.settings.seed);
-  std::vector<program::RunRequest> requests;
+  std::vector<config::Configuration> requests;
   for (const config::SeriesMember& member : members) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    requests.push_back(program::merge(program::options_of(common, member)));
-    if (!base.script->series.experiments.empty()) program::refuse_nested(*base.script, *requests.back().script);
+    config::Sources one = common;
+    config::choose(member, one);
+    requests.push_back(config::merge(one));
+    if (!base.script->series.experiments.empty()) config::refuse_nested(*base.script, *requests.back().script);
   }
   py::list runs;
   for (std::size_t n = 0; n < members.size(); ++n) {
     const py::tuple run = recorded_run([&] { return std::move(requests[n]); }, nullptr);
-    runs.append(py::make_tuple(program::varied_json(members[n]).dump(), members[n].seed, run));
+    runs.append(py::make_tuple(config::varied_json(members[n]).dump(), members[n].seed, run));
   }
   return runs;
 }
@@ -216,17 +218,17 @@ std::vector<std::string> texts(const py::handle& values) { return py::cast<std::
 
 }  // namespace
 
-py::tuple recorded_run(const std::function<program::RunRequest()>& request, PythonControllerScope* scope) {
+py::tuple recorded_run(const std::function<config::Configuration()>& request, PythonControllerScope* scope) {
   ColumnSink columns;
   run::Simulation simulation;
   std::string config_toml;
   PythonPoll poll(scope);
   {
     const py::gil_scoped_release release;
-    program::RunRequest made = request();
+    config::Configuration made = request();
     simulation = run::simulate(made.settings, *made.script, {&columns}, std::ref(poll));
-    simulation.summary.config = nlohmann::ordered_json::parse(made.config_json);
-    config_toml = std::move(made.config_toml);
+    simulation.summary.config = nlohmann::ordered_json::parse(made.json);
+    config_toml = std::move(made.toml);
   }
   poll.rethrow();
   if (scope != nullptr) scope->rethrow();
@@ -234,8 +236,8 @@ py::tuple recorded_run(const std::function<program::RunRequest()>& request, Pyth
                         config_toml);
 }
 
-program::RunOptions run_options(const py::dict& arguments) {
-  program::RunOptions options;
+config::Sources run_options(const py::dict& arguments) {
+  config::Sources options;
   const std::map<std::string, std::optional<std::string>*> named{
       {"plant", &options.plant},           {"model", &options.model},        {"controller", &options.controller},
       {"experiment", &options.experiment}, {"config", &options.config_file}, {"seed", &options.seed}};
@@ -251,8 +253,7 @@ program::RunOptions run_options(const py::dict& arguments) {
       throw std::invalid_argument("unknown option " + name);
     }
   }
-  options.outputs.fast = true;
-  options.outputs.no_lcm = true;
+  options.virtual_time = true;
   return options;
 }
 

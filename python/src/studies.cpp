@@ -8,8 +8,9 @@
 
 #include "bindings.hpp"
 #include "interruptible.hpp"
-#include "program/study_runs.hpp"
+#include "study/compute.hpp"
 #include "study/gzip.hpp"
+#include "study/runs.hpp"
 #include "study/study_folder.hpp"
 
 namespace abs_hil::python {
@@ -22,11 +23,11 @@ std::uint64_t run_study(const std::string& file, const std::string& name, const 
   Interruptible loop(std::move(progress));
   std::uint64_t runs = 0;
   loop.run([&] {
-    const study::Study study = program::make_study(study::load_study(file));
+    const study::Study study = study::make_study(study::load_study(file));
     const auto tell = [&loop](std::uint64_t done, std::uint64_t all) { loop.after(done, all); };
-    runs = program::compute_study(study, study::StudyFolder(folder, study::facts_of(study, name)),
-                                  {.number = number, .of = of}, threads, tell)
-               .runs;
+    const study::StudyFolder results(folder, study::facts_of(study, name));
+    runs = study::compute(study, results, {.number = number, .of = of}, threads, tell).runs;
+    if (of == 1) results.merge({});
   });
   return runs;
 }
@@ -35,8 +36,8 @@ std::uint64_t run_study(const std::string& file, const std::string& name, const 
 py::tuple simulate_run(const std::string& file, std::uint64_t number) {
   return recorded_run(
       [&] {
-        const study::Study study = program::make_study(study::load_study(file));
-        return program::request_of(program::settings_of_run(study, number), {});
+        const study::Study study = study::make_study(study::load_study(file));
+        return config::configuration_of(study::settings_of_run(study, number));
       },
       nullptr);
 }

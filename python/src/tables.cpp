@@ -45,7 +45,7 @@ py::object value_of(const config::Key& key) {
 
 /// One dictionary for each key, with the values that these options give.
 py::list keys(const py::dict& arguments) {
-  program::RunRequest request = program::merge(run_options(arguments));
+  config::Configuration request = config::merge(run_options(arguments));
   const config::KeyTable table(request.settings);
   py::list all;
   for (const config::Key& key : table.keys()) {
@@ -81,7 +81,7 @@ py::list figures() {
 }
 
 double max_brake_torque_Nm(const py::dict& arguments) {
-  const config::Settings s = program::merge(run_options(arguments)).settings;
+  const config::Settings s = config::merge(run_options(arguments)).settings;
   return rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
 }
 

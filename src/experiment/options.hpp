@@ -7,6 +7,10 @@
 
 namespace abs_hil::experiment {
 
+/// Values of experiment.answers beside auto.
+inline constexpr const char* answers_person = "person";
+inline constexpr const char* answers_itself = "itself";
+
 /// Options under `experiment.` in the configuration.
 struct ExperimentOptions {
   ABS_HIL_OPTIONS(ExperimentOptions);
@@ -52,7 +56,7 @@ struct ExperimentOptions {
                  .meaning =
                      "who answers questions of phases; auto: a person on a rig or at a terminal, else the "
                      "simulation itself, at once",
-                 .allowed = {"auto", "person", "itself"}, .safety = rig::weaker_if("itself"));
+                 .allowed = {"auto", answers_person, answers_itself}, .safety = rig::weaker_if(answers_itself));
   ABS_HIL_OPTION(bool, wait_for_start, false, .meaning = "stay idle until a command gives the start",
                  .safety = rig::no_effect_on_safety);
 };

@@ -66,7 +66,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
           .ideal_actuator = ideal_actuator,
           .max_brake_duty = gate.brake_duty_max,
           .start_speed_rad_s = experiment.start_speed_rad_s,
-          .answers_itself = experiment.answers != "person"};
+          .answers_itself = experiment.answers != answers_person};
 }
 
 RunLogic::RunLogic(RunLogicParts parts)

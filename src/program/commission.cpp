@@ -46,17 +46,17 @@ class Terminal final : public experiment::Dialog {
 class GuardedPulse final : public experiment::PulseGuard {
  public:
   /// @param lease  null: a guardian of its own for each pulse
-  GuardedPulse(const RunRequest& request, driver::RigDriver& driver, guardian::GuardianLease* lease)
-      : request_(request), driver_(driver), lease_(lease) {}
+  GuardedPulse(const config::Configuration& configuration, driver::RigDriver& driver, guardian::GuardianLease* lease)
+      : configuration_(configuration), driver_(driver), lease_(lease) {}
   ~GuardedPulse() override {
     driver_.tell_before_making_safe(nullptr);
     if (guardian_ != nullptr) static_cast<void>(guardian_->end());  // it uses this object's memory
   }
 
   void begin() override {
-    if (!guardian::needs_guardian(request_.settings, false)) return;
+    if (!guardian::needs_guardian(configuration_.settings, false)) return;
     recorder_.emplace(1);
-    const std::string launch_config = guardian_launch_json(request_, {});
+    const std::string launch_config = guardian_launch_json(configuration_, {});
     if (lease_ != nullptr) {
       lease_->cover(*recorder_, launch_config);
       guardian_ = lease_;
@@ -84,7 +84,7 @@ class GuardedPulse final : public experiment::PulseGuard {
   }
 
  private:
-  const RunRequest& request_;
+  const config::Configuration& configuration_;
   driver::RigDriver& driver_;
   guardian::GuardianLease* lease_;
   // The guardian must be destroyed before the recorder that it uses.
@@ -96,12 +96,12 @@ class GuardedPulse final : public experiment::PulseGuard {
 
 /// The record without which nothing else drives this board. That of an emulator is kept only where somebody asks for
 /// it.
-void keep_record(const RunRequest& request, const driver::BoardIdentity& board,
+void keep_record(const config::Settings& settings, const driver::BoardIdentity& board,
                  const experiment::Commissioning& measured, Terminal& terminal) {
-  const driver::DriverOptions& options = request.settings.driver;
+  const driver::DriverOptions& options = settings.driver;
   const bool emulated = !runtime::is_real_board(options);
   if (emulated && options.records.empty()) return;
-  experiment::BoardRecord record = experiment::describe_board(options, request.settings.rig, board, emulated);
+  experiment::BoardRecord record = experiment::describe_board(options, settings.rig, board, emulated);
   record.outputs = measured.output_times();
   record.one_turn = measured.one_turn();
   record.date = fmt::format("{:%Y-%m-%d %H:%M:%S %z}", fmt::localtime(std::time(nullptr)));
@@ -110,9 +110,9 @@ void keep_record(const RunRequest& request, const driver::BoardIdentity& board,
   terminal.tell("commissioning record: " + file.string());
 }
 
-int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
-  const driver::DriverOptions& driver_options = request.settings.driver;
-  const auto lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
+int commission(const config::Configuration& configuration, const experiment::CommissioningOptions& options) {
+  const driver::DriverOptions& driver_options = configuration.settings.driver;
+  const auto lease = guardian::ask_for_lease(configuration.settings, false);
   const auto driver = driver::make_rig_driver(driver_options);
   runtime::MonotonicClock clock;
   Terminal terminal;
@@ -120,13 +120,13 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   terminal.tell(
       "Commissioning in steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
-  terminal.tell(
-      config::model_origin(request.settings, std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
+  terminal.tell(config::model_origin(configuration.settings,
+                                     std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
   terminal.tell(fmt::format(
       "identity {}: the limits of gate and checks come from it, and the record will hold it; --set rig.identity=FILE "
       "names the file of your rig (docs/safety.md)",
-      request.settings.rig.source));
-  GuardedPulse guard(request, *driver, lease.get());
+      configuration.settings.rig.source));
+  GuardedPulse guard(configuration, *driver, lease.get());
   experiment::CommissioningOptions pulses = options;
   pulses.emulated = !runtime::is_real_board(driver_options);
   pulses.encoder_counts_per_rev = driver_options.encoder_counts_per_rev;
@@ -134,7 +134,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:
-      keep_record(request, driver->identity(), commissioning, terminal);
+      keep_record(configuration.settings, driver->identity(), commissioning, terminal);
       terminal.tell(driver_options.emulated
                         ? "All steps passed on an emulator. This does not verify any hardware."
                         : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
@@ -150,7 +150,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
 }
 
 struct CommissionOptions {
-  RunOptions options{.backend = "rig"};
+  config::Sources sources{.backend = "rig"};
   experiment::CommissioningOptions pulses{};
 };
 
@@ -158,7 +158,7 @@ struct CommissionOptions {
 
 Action add_commission(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<CommissionOptions>();
-  add_configuration_options(parser, o->options);
+  add_configuration_options(parser, o->sources);
   parser.add({.names = "--drive-duty",
               .to = &o->pulses.drive_duty,
               .help = "duty of the drive pulse, in (0, 0.3]",
@@ -167,7 +167,7 @@ Action add_commission(cli::Parser& parser, const Words&) {
               .to = &o->pulses.brake_duty,
               .help = "duty of the brake pulse, in (0, 0.7]",
               .show_default = true});
-  return [o] { return commission(merge(o->options), o->pulses); };
+  return [o] { return commission(config::merge(o->sources), o->pulses); };
 }
 
 }  // namespace abs_hil::program

@@ -12,7 +12,7 @@
 #include "program/run_arguments.hpp"
 #include "program/run_progress.hpp"
 #include "program/signals.hpp"
-#include "program/study_runs.hpp"
+#include "program/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "study/comparison.hpp"
 #include "study/parallel.hpp"
@@ -20,6 +20,22 @@
 namespace abs_hil::program {
 
 namespace {
+
+/// The options of `abs_hil compare` as typed.
+struct CompareOptions {
+  config::Sources sources{};  ///< only plant, model, configuration file and assignments are used
+  std::string controllers{"adaptive,sliding-mode"};
+  std::size_t repeat{100};
+  std::uint64_t seed{1};
+  std::optional<std::string> vary{};
+  std::size_t threads{0};  ///< 0: one for each processor
+  std::optional<std::string> json_file{};
+  std::optional<std::string> csv_file{};
+  std::optional<std::string> markdown_file{};
+  std::optional<std::string> runs_file{};
+  std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
+  std::optional<std::string> run_folder{};  ///< --out: its folder
+};
 
 /// A controller's heading as the name of a folder.
 std::string folder_name(std::string name) {
@@ -62,14 +78,12 @@ int record(const CompareOptions& options, const study::Study& study, const std::
   return status;
 }
 
-}  // namespace
-
-int compare(const CompareOptions& options, const std::vector<std::string>& command_line) {
+int compare_controllers(const CompareOptions& options, const std::vector<std::string>& command_line) {
   refuse_number(options.runs_file);
-  RunOptions run = options.run;
-  run.defaults.push_back(fmt::format("experiment.start_speed_rad_s={}", study_start_speed_rad_s));
-  const RunRequest request = merge(run);
-  const config::Settings& s = request.settings;
+  config::Sources sources = options.sources;
+  sources.defaults.emplace_back(study::start_speed_default);
+  const config::Configuration merged = config::merge(sources);
+  const config::Settings& s = merged.settings;
   const study::Study study(
       {.controllers = study::split_contenders(options.controllers),
        .repeat = {.runs = options.repeat,
@@ -96,7 +110,7 @@ int compare(const CompareOptions& options, const std::vector<std::string>& comma
     return status_of(signalled());
   }
   const study::ComparisonTable table = study::tabulate(study, runs);
-  if (json) json->write(study::to_json(table, request.config_json));
+  if (json) json->write(study::to_json(table, merged.json));
   if (csv) csv->write(study::to_csv(table));
   if (markdown) markdown->write(study::to_markdown(table));
   if (runs_file) runs_file->write(study::runs_csv(study, runs));
@@ -104,12 +118,14 @@ int compare(const CompareOptions& options, const std::vector<std::string>& comma
   return exit_completed;
 }
 
+}  // namespace
+
 Action add_compare(cli::Parser& compare, const Words& words) {
   const auto options = std::make_shared<CompareOptions>();
   CompareOptions& o = *options;
-  compare.add({.names = "--plant", .to = &o.run.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
+  compare.add({.names = "--plant", .to = &o.sources.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
   compare.add({.names = "--model",
-               .to = &o.run.model,
+               .to = &o.sources.model,
                .help = "every controller's model (default: the plant, before it varies)",
                .type = "NAME|FILE"});
   compare.add({.names = "--controllers,--controller",
@@ -131,8 +147,8 @@ Action add_compare(cli::Parser& compare, const Words& words) {
                .help = "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
                .type = "SPEC",
                .default_text = "parameters=0.1,theta=0.1,phase"});
-  add_config_file(compare, o.run);
-  add_assignments(compare, o.run);
+  add_config_file(compare, o.sources);
+  add_assignments(compare, o.sources);
   compare.add({.names = "--threads",
                .to = &o.threads,
                .help = "number of threads, 0: one for each processor; does not change the results",
@@ -155,7 +171,7 @@ Action add_compare(cli::Parser& compare, const Words& words) {
                .type = "DIR",
                .needs = {"--run"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
-  return [options, words] { return program::compare(*options, words); };
+  return [options, words] { return compare_controllers(*options, words); };
 }
 
 }  // namespace abs_hil::program

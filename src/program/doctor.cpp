@@ -39,8 +39,7 @@ diagnosis::Finding service_finding(const std::string& socket) {
 }
 
 /// Runs all checks of this computer or the named one, and prints a fix for each shortcoming.
-int doctor(const RunRequest& request, const std::string& only, bool json) {
-  const config::Settings& s = request.settings;
+int doctor(const config::Settings& s, const std::string& only, bool json) {
   std::unique_ptr<guardian::GuardianLease> lease;
   diagnosis::Examination examination{.only = only,
                                      .lcm_url = telemetry::default_lcm_url(),
@@ -50,7 +49,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                      .driver = s.driver,
                                      .make_driver = [&] {
                                        // The resident service lets go of the board for the holder of its lease.
-                                       lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
+                                       lease = guardian::ask_for_lease(s, false);
                                        return run::make_driver(s);
                                      }};
   if (s.on_rig() && runtime::is_real_board(s.driver)) {
@@ -83,7 +82,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
 }
 
 struct DoctorOptions {
-  RunOptions options{};
+  config::Sources sources{};
   std::string only{};
   bool json{false};
 };
@@ -92,11 +91,11 @@ struct DoctorOptions {
 
 Action add_doctor(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<DoctorOptions>();
-  add_backend_option(parser, o->options);
-  add_configuration_options(parser, o->options);
+  add_backend_option(parser, o->sources);
+  add_configuration_options(parser, o->sources);
   parser.add({.names = "--only", .to = &o->only, .help = "run only this check", .one_of = diagnosis::check_names()});
   parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
-  return [o] { return doctor(merge(o->options), o->only, o->json); };
+  return [o] { return doctor(config::merged_settings(o->sources), o->only, o->json); };
 }
 
 }  // namespace abs_hil::program

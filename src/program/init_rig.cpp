@@ -16,7 +16,7 @@ namespace abs_hil::program {
 
 namespace {
 
-int init_rig(const RunRequest& request, const std::string& name) {
+int init_rig(const config::Settings& settings, const std::string& name) {
   const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
   if (name.empty() || !std::all_of(name.begin(), name.end(), is_plain)) {
     throw config::ConfigError(fmt::format("init-rig: \"{}\": give a name of letters, digits, - and _", name));
@@ -28,7 +28,7 @@ int init_rig(const RunRequest& request, const std::string& name) {
         fmt::format("init-rig: {} exists already; give another name or move it away", file.string()));
   }
   try {
-    files::write_result(file, "model file", config::rig_file(request.settings, name));
+    files::write_result(file, "model file", config::rig_file(settings, name));
   } catch (const files::FileError& error) {
     throw config::ConfigError(std::string("init-rig: ") + error.what());
   }
@@ -40,14 +40,14 @@ int init_rig(const RunRequest& request, const std::string& name) {
 }  // namespace
 
 Action add_init_rig(cli::Parser& parser, const Words&) {
-  const auto o = std::make_shared<RunOptions>();
+  const auto o = std::make_shared<config::Sources>();
   const auto name = std::make_shared<std::string>();
   parser.add({.names = "name", .to = name.get(), .help = "name of the rig", .type = "NAME", .required = true});
   parser.add({.names = "--plant",
               .to = &o->plant,
               .help = "plant whose values it begins with, by name or TOML file",
               .type = "NAME|FILE"});
-  return [o, name] { return init_rig(merge(*o), *name); };
+  return [o, name] { return init_rig(config::merged_settings(*o), *name); };
 }
 
 }  // namespace abs_hil::program

@@ -21,7 +21,8 @@ namespace abs_hil::program {
 namespace {
 
 struct LatencyOptions {
-  RunOptions options{};
+  config::Sources sources{};
+  std::optional<std::string> histogram_file{};
   double duration_s{10.0};
   std::optional<int> second_offset_us{};  ///< offset of the first cycle from a whole second, us
   bool json{false};
@@ -63,15 +64,15 @@ config::Plan timing_load(double duration_s) {
   return plan;
 }
 
-int latency(const RunRequest& request, const LatencyOptions& options) {
-  config::Settings s = request.settings;
+int latency(const LatencyOptions& options) {
+  config::Settings s = config::merged_settings(options.sources);
   s.experiment.start_speed_rad_s = start_speed_rad_s;
   // Gaps in the simulation are what this command measures; they must not end it.
   constexpr double any_gap_s = 3600.0;
   if (s.backend == "sim") s.realtime.overruns.cycle_gap_max_s = any_gap_s;
   std::optional<files::ResultFile> histogram;
   try {
-    if (request.outputs.histogram_file) histogram.emplace(*request.outputs.histogram_file, "histogram");
+    if (options.histogram_file) histogram.emplace(*options.histogram_file, "histogram");
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
@@ -102,8 +103,8 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
 
 Action add_latency(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<LatencyOptions>();
-  add_configuration_options(parser, o->options);
-  add_timing_options(parser, o->options);
+  add_configuration_options(parser, o->sources);
+  add_timing_options(parser, o->sources, o->histogram_file);
   parser.add({.names = "--duration",
               .to = &o->duration_s,
               .help = "duration of the test, s",
@@ -115,7 +116,7 @@ Action add_latency(cli::Parser& parser, const Words&) {
               .type = "US",
               .range = {0, 999'999}});
   parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
-  return [o] { return latency(merge(o->options), *o); };
+  return [o] { return latency(*o); };
 }
 
 }  // namespace abs_hil::program

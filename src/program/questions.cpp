@@ -10,16 +10,39 @@
 #include <array>
 #include <cstdio>
 
-#include "program/answers.hpp"
+#include "config/config_error.hpp"
 
 namespace abs_hil::program {
 
+bool hears_commands(const RunRequest& request) {
+  return request.settings.commands.enabled && !request.outputs.no_lcm && !request.virtual_time;
+}
+
+bool at_terminal() noexcept { return ::isatty(STDIN_FILENO) == 1; }
+
+void check_questions(const RunRequest& request) {
+  const config::Settings& s = request.settings;
+  if (!config::asks(*request.script)) return;
+  if (s.experiment.answers == experiment::answers_person && !at_terminal() && !hears_commands(request)) {
+    throw config::ConfigError(
+        fmt::format("experiment {} asks a person, but stdin is no terminal and remote commands are not enabled: start "
+                    "it in a terminal, or with --set commands.enabled=true --set commands.key_file=FILE and without "
+                    "--no-lcm, and answer with abs_hil send continue",
+                    request.script->name));
+  }
+  if (s.experiment.answers == experiment::answers_itself && s.on_rig() && !s.driver.emulated) {
+    throw config::ConfigError(fmt::format(
+        "experiment {}: experiment.answers = itself: on a rig only a person can say that it is done; leave it out",
+        request.script->name));
+  }
+}
+
 Questions::Questions(const RunRequest& request, run::Run& run)
     : run_(run),
-      by_person_(request.settings.experiment.answers == answers_person),
+      by_person_(request.settings.experiment.answers == experiment::answers_person),
       commands_(hears_commands(request)),
       terminal_(at_terminal()) {
-  if (by_person_ || !asks(*request.script) || request.in_series) return;
+  if (by_person_ || !config::asks(*request.script) || request.in_series) return;
   spdlog::info("the simulation answers the questions of experiment {} itself, at once", request.script->name);
 }
 

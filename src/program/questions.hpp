@@ -1,9 +1,18 @@
+// Questions of an experiment's phases to a person at the terminal.
 #pragma once
 
 #include "program/command_line.hpp"
 #include "run/run.hpp"
 
 namespace abs_hil::program {
+
+/// True if the run takes commands over LCM.
+[[nodiscard]] bool hears_commands(const RunRequest& request);
+/// True if stdin is a terminal.
+[[nodiscard]] bool at_terminal() noexcept;
+/// Refuses a run whose questions nobody could answer, or that would move a rig without a person's answer. Throws
+/// config::ConfigError.
+void check_questions(const RunRequest& request);
 
 /// Puts the questions of a run's phases to the terminal and hands Enter to the run. For the slow thread.
 class Questions {

@@ -19,7 +19,6 @@
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
 #include "guardian/guarding.hpp"
-#include "program/answers.hpp"
 #include "program/exit_status.hpp"
 #include "program/foreign_run.hpp"
 #include "program/questions.hpp"
@@ -145,7 +144,7 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
                   driver::error_text(outcome.safe_state), run.driver().what_holds_unsafe());
   }
   analysis::RunSummary summary = run::summarise(run, outcome, foreign.summary());
-  summary.config = nlohmann::ordered_json::parse(request.config_json);
+  summary.config = nlohmann::ordered_json::parse(request.json);
   summary.publish_failures = outputs.publish_failures();
   summary.csv_rows_lost = outputs.csv_rows_lost();
   if (rig::is_fault(outcome.reason)) {
@@ -177,7 +176,7 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
 
 int run(const RunRequest& request) {
   const config::Settings& s = request.settings;
-  const bool virtual_time = request.outputs.fast;
+  const bool virtual_time = request.virtual_time;
   check_questions(request);
   // Outlives the driver: the service takes the board back when nobody has it open any more.
   const std::unique_ptr<guardian::GuardianLease> lease = guardian::ask_for_lease(s, virtual_time);
@@ -186,7 +185,6 @@ int run(const RunRequest& request) {
     spdlog::warn("{}; the gate limits it to that", problem);
   ForeignRun foreign(s.on_rig());
   run::Run run(prepared, {.real_time = !virtual_time, .overruns = overruns_of(s, virtual_time)});
-  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   require_resources(run, lease != nullptr);
   foreign.look_at(run.controller(), run.real_time());
   RunOutputs outputs(request, run);

@@ -2,17 +2,17 @@
 
 namespace abs_hil::program {
 
-void add_backend_option(cli::Parser& parser, RunOptions& o) {
+void add_backend_option(cli::Parser& parser, config::Sources& o) {
   parser.add(
       {.names = "--backend", .to = &o.backend, .help = "sim or rig", .one_of = {"sim", "rig"}, .show_default = true});
 }
 
-void add_config_file(cli::Parser& parser, RunOptions& o) {
+void add_config_file(cli::Parser& parser, config::Sources& o) {
   parser.add(
       {.names = "--config", .to = &o.config_file, .help = "TOML file with any configuration values", .type = "FILE"});
 }
 
-void add_assignments(cli::Parser& parser, RunOptions& o) {
+void add_assignments(cli::Parser& parser, config::Sources& o) {
   parser.add({.names = "--set",
               .to = &o.assignments,
               .help = "set any configuration value (abs_hil list --keys)",
@@ -20,7 +20,7 @@ void add_assignments(cli::Parser& parser, RunOptions& o) {
               .repeated = true});
 }
 
-void add_configuration_options(cli::Parser& parser, RunOptions& o) {
+void add_configuration_options(cli::Parser& parser, config::Sources& o) {
   add_config_file(parser, o);
   parser.add({.names = "--plant", .to = &o.plant, .help = "simulated plant by name or TOML file", .type = "NAME|FILE"});
   parser.add({.names = "--model",
@@ -34,7 +34,7 @@ void add_configuration_options(cli::Parser& parser, RunOptions& o) {
   add_assignments(parser, o);
 }
 
-void add_timing_options(cli::Parser& parser, RunOptions& o) {
+void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<std::string>& histogram_file) {
   parser.add({.names = "--rate", .to = &o.rate_Hz, .help = "control cycles per second, 100 to 10000", .type = "HZ"});
   parser.add({.names = "--rt",
               .to = &o.realtime,
@@ -42,7 +42,7 @@ void add_timing_options(cli::Parser& parser, RunOptions& o) {
                       "prefer)",
               .one_of = {"require", "prefer", "off"}});
   parser.add({.names = "--histogram",
-              .to = &o.outputs.histogram_file,
+              .to = &histogram_file,
               .help = "write latency histograms in cyclictest's format",
               .type = "FILE"});
 }
@@ -75,11 +75,11 @@ void add_run_options(cli::Parser& parser, RunOptions& o) {
   parser.add(
       {.names = "--experiment", .to = &o.experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});
   parser.add({.names = "--slip-ref", .to = &o.slip_ref, .help = "slip reference, in (0, 1)", .type = "X"});
-  add_timing_options(parser, o);
+  add_timing_options(parser, o, o.outputs.histogram_file);
   parser.add({.names = "--wait-for-start",
               .to = &o.wait_for_start,
               .help = "wait for `abs_hil send start` before the first phase (needs commands.enabled)"});
-  parser.add({.names = "--fast", .to = &o.outputs.fast, .help = "run in virtual time, as fast as the computer can"});
+  parser.add({.names = "--fast", .to = &o.virtual_time, .help = "run in virtual time, as fast as the computer can"});
   parser.add({.names = "--seed", .to = &o.seed, .help = "seed of all random numbers in the simulator", .type = "N"});
   parser.add({.names = "--inject",
               .to = &o.injections,

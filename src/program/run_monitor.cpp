@@ -28,10 +28,10 @@ std::uint64_t silent_cycles_max(const config::Settings& s) {
 
 }  // namespace
 
-std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
+std::string guardian_launch_json(const config::Configuration& configuration, const std::filesystem::path& record_prefix,
                                  const std::vector<std::string>& signals) {
-  const config::Settings& s = request.settings;
-  return to_json(guardian::LaunchConfig{.config_json = request.config_json,
+  const config::Settings& s = configuration.settings;
+  return to_json(guardian::LaunchConfig{.config_json = configuration.json,
                                         .experiment = s.experiment.name,
                                         .controller = s.control.controller,
                                         .plant = s.plant_name,
@@ -49,7 +49,7 @@ RunMonitor::RunMonitor(const RunRequest& request, guardian::GuardianLease* lease
       recorder_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
       resident_(lease != nullptr),
       request_(request) {
-  if (!guardian::needs_guardian(request.settings, request.outputs.fast)) {
+  if (!guardian::needs_guardian(request.settings, request.virtual_time)) {
     pages_.emplace();
     heartbeat_.emplace(pages_->run(), pages_->guard(), recorder_.ring());
     return;
@@ -102,7 +102,7 @@ void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, dou
        .controller = s.control.controller,
        .plant = s.plant_name,
        .backend = s.backend,
-       .config_json = request.config_json,
+       .config_json = request.json,
        .version = ABS_HIL_VERSION,
        .names = names_},
       s.telemetry.channel_prefix, problems);

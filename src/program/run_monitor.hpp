@@ -13,7 +13,8 @@
 namespace abs_hil::program {
 
 /// The launch configuration of the run's guardian, as JSON.
-[[nodiscard]] std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
+[[nodiscard]] std::string guardian_launch_json(const config::Configuration& configuration,
+                                               const std::filesystem::path& record_prefix,
                                                const std::vector<std::string>& signals = {});
 
 /// Monitors a run: it keeps the flight record of every run, and starts the guardian for a run in real time on a board.

@@ -20,14 +20,14 @@ constexpr std::int64_t write_period_ns = 50'000'000;
 RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
   // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
   // network at once, so publish only if --lcm-url is given.
-  if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
+  if (!request.outputs.no_lcm && (!request.virtual_time || request.outputs.lcm_url)) {
     const std::string url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url());
     static_cast<void>(telemetry::parse_lcm_url(url));  // a malformed URL is a usage error, not a missing network
     lcm_.emplace(url);
   }
   try {
     // Open named files first: a bad path then leaves no run folder behind.
-    open_files(request.outputs);
+    open_files(request.outputs, request.virtual_time);
     open_folder(request);
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
@@ -38,13 +38,13 @@ RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
   listen();
 }
 
-void RunOutputs::open_files(const OutputOptions& outputs) {
-  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, run_.names());
+void RunOutputs::open_files(const OutputOptions& outputs, bool virtual_time) {
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, virtual_time ? 0 : write_period_ns, run_.names());
   if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file, "summary");
   if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file, "histogram");
   if (outputs.log_file) {
-    log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt,
-                      outputs.fast ? 0.0 : static_cast<double>(write_period_ns) * 1e-9);
+    log_.emplace_back(*outputs.log_file, virtual_time ? std::optional(virtual_epoch_us) : std::nullopt,
+                      virtual_time ? 0.0 : static_cast<double>(write_period_ns) * 1e-9);
   }
 }
 
@@ -55,7 +55,7 @@ void RunOutputs::open_folder(const RunRequest& request) {
   } else {
     // A run in virtual time can be repeated from its command line: it leaves a run folder only if asked.
     const std::filesystem::path runs = run_folder::default_runs_dir();
-    if (o.fast || o.no_run_folder || o.names_files() || runs.empty()) return;
+    if (request.virtual_time || o.no_run_folder || o.names_files() || runs.empty()) return;
     const std::time_t now = std::time(nullptr);
     std::tm local{};
     localtime_r(&now, &local);
@@ -67,15 +67,16 @@ void RunOutputs::open_folder(const RunRequest& request) {
       return;
     }
   }
-  folder_->write(run_folder::file::config, std::string_view(request.config_toml));
+  folder_->write(run_folder::file::config, std::string_view(request.toml));
   folder_->write(run_folder::file::experiment, std::string_view(request.script->text));
   for (const auto& [name, text] : request.script->files) folder_->write(name, std::string_view(text));
   open_files(
-      {.fast = o.fast,
-       .csv_file = folder_->of(run_folder::file::csv),
+      {.csv_file = folder_->of(run_folder::file::csv),
        .log_file = folder_->of(run_folder::file::log),
        .summary_file = folder_->of(run_folder::file::summary),
-       .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())});
+       .histogram_file =
+           request.virtual_time ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())},
+      request.virtual_time);
   events_.emplace(folder_->of(run_folder::file::events), run_.names());
 }
 
@@ -89,14 +90,14 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                             .controller = s.control.controller,
                                             .plant = s.plant_name,
                                             .backend = s.backend,
-                                            .config_json = request.config_json,
+                                            .config_json = request.json,
                                             .version = ABS_HIL_VERSION,
                                             .names = run_.names()},
                   [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_, run_.names());
+    if (!request.virtual_time) remote_commands_.emplace(s, *stream_, run_.names());
     // This runs in the listening thread: the next cycle sees the request.
     command_listener_.emplace(*lcm_, *stream_, [this] { run_.request_stop(rig::Reason::stop_command); });
   }

@@ -48,7 +48,7 @@ class RunOutputs {
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
   [[nodiscard]] telemetry::StatusSnapshot snapshot() const;
   void open_folder(const RunRequest& request);
-  void open_files(const OutputOptions& outputs);
+  void open_files(const OutputOptions& outputs, bool virtual_time);
   void open_stream(const RunRequest& request);
   void listen();
 

@@ -79,7 +79,7 @@ config::Settings settings_of(const Given& given, const std::vector<std::string>&
 }
 
 /// @param file  is read; nothing: the command line alone counts
-Given read_given(const RunOptions& o, const std::optional<std::string>& file) {
+Given read_given(const config::Sources& o, const std::optional<std::string>& file) {
   Given given{.assignments = o.assignments, .names_board = file.has_value()};
   for (const std::string& a : o.assignments) given.names_board = given.names_board || a.starts_with("driver.kind=");
   try {
@@ -279,11 +279,11 @@ bool print(std::string good, std::string bad) {
 Action add_safe(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<SafeCommand>();
   parser.add({.names = "--config",
-              .to = &o->options.config_file,
+              .to = &o->sources.config_file,
               .help = "TOML file whose table [driver] names the board",
               .type = "FILE"});
   parser.add({.names = "--set",
-              .to = &o->options.assignments,
+              .to = &o->sources.assignments,
               .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
               .type = "key=value",
               .repeated = true});
@@ -301,9 +301,9 @@ int make_boards_safe(const SafeCommand& command) {
   take_first_place();
   ZeroWriting zeros;
   Given given;
-  auto with_file = in_background([o = command.options] { return read_given(o, o.config_file); });
+  auto with_file = in_background([o = command.sources] { return read_given(o, o.config_file); });
   const bool in_time = is_there(with_file, file_read_within_ms);
-  given = in_time ? with_file.get() : read_given(command.options, std::nullopt);
+  given = in_time ? with_file.get() : read_given(command.sources, std::nullopt);
   search(zeros, given);
   zeros.wait_for_first_tries(first_tries_within_ms);
   if (!in_time && is_there(with_file, late_file_within_ms)) {
@@ -311,7 +311,7 @@ int make_boards_safe(const SafeCommand& command) {
     search(zeros, given);
     zeros.wait_for_first_tries(first_tries_within_ms);
   } else if (!in_time) {
-    given.problems.push_back(command.options.config_file.value_or("the command line") +
+    given.problems.push_back(command.sources.config_file.value_or("the command line") +
                              ": cannot be read: its file system does not answer");
   }
 
@@ -363,9 +363,9 @@ std::optional<int> safe_at_once(int argc, char** argv) {
       value = argv[++i];
     }
     if (name == "--config" && value) {
-      command.options.config_file = *value;
+      command.sources.config_file = *value;
     } else if (name == "--set" && value) {
-      command.options.assignments.push_back(*value);
+      command.sources.assignments.push_back(*value);
     } else if (name == "--insist" && value) {
       char* rest = nullptr;
       command.insist_s = std::strtod(value->c_str(), &rest);

@@ -10,8 +10,8 @@ constexpr double most_insist_s = 3600.0;
 
 /// Options of `abs_hil safe` as typed.
 struct SafeCommand {
-  RunOptions options{.backend = "rig"};  ///< only the configuration file and the assignments are used
-  double insist_s{3.0};                  ///< how long it tries to verify
+  config::Sources sources{.backend = "rig"};  ///< only the configuration file and the assignments are used
+  double insist_s{3.0};                       ///< how long it tries to verify
 };
 
 /// `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else; then ends the

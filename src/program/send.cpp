@@ -36,15 +36,16 @@ commands::Order order_of(const std::vector<std::string>& words) {
 }
 
 struct SendOptions {
-  RunOptions options{};
+  config::Sources sources{};
+  std::optional<std::string> lcm_url{};
   std::vector<std::string> order{};  ///< "stop", "start", "continue", "slip-ref X", "gain NAME X"
   double timeout_s{3.0};
 };
 
-int send(const RunRequest& request, const SendOptions& options) {
-  const config::Settings& s = request.settings;
+int send(const SendOptions& options) {
+  const config::Settings s = config::merged_settings(options.sources);
   const commands::Reply reply =
-      commands::send(order_of(options.order), {.url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url()),
+      commands::send(order_of(options.order), {.url = options.lcm_url.value_or(telemetry::default_lcm_url()),
                                                .channel_prefix = s.telemetry.channel_prefix,
                                                .key_file = s.commands.key_file,
                                                .timeout_s = options.timeout_s});
@@ -71,20 +72,20 @@ Action add_send(cli::Parser& parser, const Words&) {
               .count = {1, 3},
               .required = true});
   parser.add(
-      {.names = "--config", .to = &o->options.config_file, .help = "TOML file with commands.key_file", .type = "FILE"});
+      {.names = "--config", .to = &o->sources.config_file, .help = "TOML file with commands.key_file", .type = "FILE"});
   parser.add({.names = "--set",
-              .to = &o->options.assignments,
+              .to = &o->sources.assignments,
               .help = "set any configuration value",
               .type = "key=value",
               .repeated = true});
-  parser.add({.names = "--lcm-url", .to = &o->options.outputs.lcm_url, .help = "LCM network"});
+  parser.add({.names = "--lcm-url", .to = &o->lcm_url, .help = "LCM network"});
   parser.add({.names = "--timeout",
               .to = &o->timeout_s,
               .help = "longest wait for the answer, s",
               .type = "S",
               .range = {0.1, 60.0},
               .show_default = true});
-  return [o] { return send(merge(o->options), *o); };
+  return [o] { return send(*o); };
 }
 
 }  // namespace abs_hil::program

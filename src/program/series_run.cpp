@@ -18,8 +18,8 @@
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
-#include "program/answers.hpp"
 #include "program/exit_status.hpp"
+#include "program/questions.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
@@ -92,6 +92,13 @@ class Progress {
   std::mutex mutex_{};
 };
 
+/// The options of one run of the series.
+RunOptions one_of(const RunOptions& common, const config::SeriesMember& member) {
+  RunOptions options = common;
+  config::choose(member, options);
+  return options;
+}
+
 std::string text_of(const config::SeriesMember& member) {
   std::string text;
   for (const auto& [key, value] : member.varied) text += fmt::format("{} = {}, ", key, config::text_of(value));
@@ -116,8 +123,8 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
   }
   try {
     folder = std::make_unique<run_folder::SeriesFolder>(
-        path, run_folder::sha256_of(base.config_json + base.settings.plant_name + base.settings.backend),
-        base.script->name, std::move(entries));
+        path, run_folder::sha256_of(base.json + base.settings.plant_name + base.settings.backend), base.script->name,
+        std::move(entries));
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
@@ -192,7 +199,7 @@ class SeriesRun {
         members_(members),
         folder_(folder),
         left_(left_of(members.size(), folder)),
-        pause_s_(base.outputs.fast ? 0.0 : base.script->series.pause_s),
+        pause_s_(base.virtual_time ? 0.0 : base.script->series.pause_s),
         progress_(members.size(), members.size() - left_.size(), pause_s_) {
     for (std::size_t i = 0; folder != nullptr && i < members.size(); ++i) {
       if (folder->done(i) && folder->status(i) != completed) ++ended_early_;
@@ -205,7 +212,7 @@ class SeriesRun {
   /// Carries out the runs. Returns the program's exit status.
   int run_all() {
     // In virtual time one run per processor at a time; on the rig one after the other.
-    const bool at_once = base_.outputs.fast && base_.settings.backend == "sim";
+    const bool at_once = base_.virtual_time && base_.settings.backend == "sim";
     study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
     if (interrupted_ == 0 && signalled() != rig::Reason::none) {
@@ -233,7 +240,7 @@ class SeriesRun {
     if (interrupted_ != 0 || halted_by_ != 0 || stopped_ || signalled() != rig::Reason::none) return;
     const std::size_t i = left_[k];
     const std::string what = fmt::format("{}, {}", run_folder::SeriesFolder::name_of(i), text_of(members_[i]));
-    RunRequest request = merge(options_of(common_, members_[i]));
+    RunRequest request = merge(one_of(common_, members_[i]));
     request.command_line = base_.command_line;
     request.in_series = [this, &what](std::string_view phase) { progress_.show(what, phase); };
     request.stop_was_sent = [this] { stopped_ = true; };
@@ -308,10 +315,10 @@ int run_series(const RunOptions& common, const RunRequest& base) {
   std::vector<run_folder::SeriesEntry> entries;
   // Check every run's configuration before the first run moves anything.
   for (const config::SeriesMember& member : members) {
-    const RunRequest one = merge(options_of(common, member));
-    if (!base.script->series.experiments.empty()) refuse_nested(*base.script, *one.script);
+    const RunRequest one = merge(one_of(common, member));
+    if (!base.script->series.experiments.empty()) config::refuse_nested(*base.script, *one.script);
     check_questions(one);
-    entries.push_back({.varied = varied_json(member), .seed = member.seed});
+    entries.push_back({.varied = config::varied_json(member), .seed = member.seed});
   }
   const std::unique_ptr<run_folder::SeriesFolder> folder = open_folder(base, std::move(entries));
   note_signals();

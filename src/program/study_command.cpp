@@ -13,10 +13,10 @@
 #include "program/exit_status.hpp"
 #include "program/run_progress.hpp"
 #include "program/signals.hpp"
-#include "program/study_runs.hpp"
 #include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
+#include "study/runs.hpp"
 
 namespace abs_hil::program {
 
@@ -113,7 +113,7 @@ study::Shard read_shard(const std::string& text) {
 
 int run_study(const StudyCommand& command) {
   const study::Shard shard = command.shard ? read_shard(*command.shard) : study::Shard{};
-  const study::Study study = make_study(study::load_study(command.file));
+  const study::Study study = study::make_study(study::load_study(command.file));
   const study::StudyFolder folder(study_folder(command.file, command.folder),
                                   study::facts_of(study, name_of(command.file)));
   const auto start = std::chrono::steady_clock::now();
@@ -122,11 +122,12 @@ int run_study(const StudyCommand& command) {
   std::uint64_t to_compute = 0;
   try {
     std::optional<RunProgress> progress;
-    tally = compute_study(study, folder, shard, command.threads, [&](std::uint64_t done, std::uint64_t all) {
+    tally = study::compute(study, folder, shard, command.threads, [&](std::uint64_t done, std::uint64_t all) {
       to_compute = all;
       if (done == 0) progress.emplace(all);
       if (done > 0) progress->show(done);
     });
+    if (shard.of == 1) folder.merge({});
   } catch (const Interrupted& interrupted) {
     spdlog::warn(
         "interrupted after {} of {} runs. {} keeps each chunk that is complete ({} runs each); the same command goes "
@@ -188,6 +189,15 @@ int show_status(const std::string& path) {
 
 }  // namespace
 
+int record_run(const study::Study& study, std::uint64_t number, const std::optional<std::string>& folder,
+               const std::vector<std::string>& command_line) {
+  RunRequest request{config::configuration_of(study::settings_of_run(study, number))};
+  request.outputs = {.no_lcm = true, .run_folder = folder};
+  request.virtual_time = true;
+  request.command_line = command_line;
+  return run(request);
+}
+
 int study(const StudyCommand& command, const std::vector<std::string>& command_line) {
   const bool below = command.merge.parsed() || command.status.parsed() || command.submit.parsed();
   if (below && !command.parser.given().empty()) {
@@ -201,7 +211,7 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
     throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
   }
   if (!command.run) return run_study(command);
-  return record_run(make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
+  return record_run(study::make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
                     command.folder, command_line);
 }
 

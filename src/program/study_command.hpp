@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/command_line.hpp"
+#include "study/study.hpp"
 
 namespace abs_hil::program {
 
@@ -37,6 +38,13 @@ struct StudyCommand {
 /// Runs the subcommand. Returns the exit status. Throws config::ConfigError, std::invalid_argument, driver::Unavailable
 /// and, for files that cannot be written, std::runtime_error.
 int study(const StudyCommand& command, const std::vector<std::string>& command_line);
+
+/// Repeats one run of a study with everything recorded in a run folder, as `abs_hil --fast --out FOLDER` does: from the
+/// beginning to the end of its experiment. Its config.toml repeats it once more. Returns the run's exit status.
+/// @param folder  new or empty; none: a new one below the folder of runs
+/// Throws config::ConfigError unless the study has a run of this number, and what `run` throws.
+int record_run(const study::Study& study, std::uint64_t number, const std::optional<std::string>& folder,
+               const std::vector<std::string>& command_line);
 
 /// `abs_hil study submit`: writes the scripts of an array job and of the job that merges, and hands them to Slurm.
 int submit_study(const StudyCommand& command);

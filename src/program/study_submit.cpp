@@ -15,7 +15,6 @@
 #include "files/result_file.hpp"
 #include "program/exit_status.hpp"
 #include "program/study_command.hpp"
-#include "program/study_runs.hpp"
 #include "study/compute.hpp"
 
 namespace abs_hil::program {
@@ -112,7 +111,7 @@ int submit_study(const StudyCommand& command) {
                     path.string()));
   }
   // Everything that is wrong with the study shows here, not in a log on a node.
-  const study::Study study = make_study(study::load_study(command.submitted));
+  const study::Study study = study::make_study(study::load_study(command.submitted));
   const study::StudyFolder folder(path, study::facts_of(study, file.stem().string()));
   const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
   if (missing.empty()) {

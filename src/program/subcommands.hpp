@@ -45,9 +45,6 @@ Action add_replay(cli::Parser& parser, const Words& words);
 Action add_convert(cli::Parser& parser, const Words& words);
 Action add_send(cli::Parser& parser, const Words& words);
 
-/// Compares controllers in simulation, or records one run of the comparison. Throws config::ConfigError and
-/// std::invalid_argument.
-int compare(const CompareOptions& options, const Words& words);
 /// Runs an experiment and returns the exit status. Throws what its parts throw: see program.cpp.
 int run(const RunRequest& request);
 /// Runs the series of runs that `base.script` describes; each run is merged anew from the options as typed. Returns the

@@ -18,33 +18,34 @@ namespace abs_hil::program {
 
 namespace {
 
-int validate(const RunOptions& options) {
-  const RunRequest request = merge(options);
-  const config::Script& script = *request.script;
-  fmt::print("{}", config::explain(script, request.settings));
+int validate(const config::Sources& sources) {
+  const config::Configuration merged = config::merge(sources);
+  const config::Script& script = *merged.script;
+  const config::Settings& s = merged.settings;
+  fmt::print("{}", config::explain(script, s));
   if (!script.series.experiments.empty()) {
     int status = exit_completed;
     for (const std::string& name : script.series.experiments) {
       fmt::print("\n");
-      RunOptions one = options;
+      config::Sources one = sources;
       one.experiment = name;
-      refuse_nested(script, *config::find(*one.experiment));
+      config::refuse_nested(script, *config::find(*one.experiment));
       status = std::max(status, validate(one));
     }
     return status;
   }
-  const config::Plan plan = config::plan(script, request.settings);
-  const std::vector<std::string> problems = config::beyond_limits(plan, request.settings);
+  const config::Plan plan = config::plan(script, s);
+  const std::vector<std::string> problems = config::beyond_limits(plan, s);
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
   // Find errors that appear only when a run is made.
   static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
-  if (request.settings.backend == "sim") static_cast<void>(plant_sim::Plant(request.settings.plant));
-  const std::string model = config::in_words(config::model_differences(request.settings));
-  if (!request.settings.on_rig() && !model.empty()) fmt::print("The model differs from the plant: {}.\n", model);
+  if (s.backend == "sim") static_cast<void>(plant_sim::Plant(s.plant));
+  const std::string model = config::in_words(config::model_differences(s));
+  if (!s.on_rig() && !model.empty()) fmt::print("The model differs from the plant: {}.\n", model);
   fmt::print(
-      "The experiment is within the limits of backend {}, {} {}.{}\n", request.settings.backend,
-      request.settings.on_rig() ? "model" : "plant", request.settings.plant_name,
+      "The experiment is within the limits of backend {}, {} {}.{}\n", s.backend, s.on_rig() ? "model" : "plant",
+      s.plant_name,
       script.events.empty() ? "" : " It has events, which only a simulation can carry out: --backend rig refuses it.");
   return exit_completed;
 }
@@ -52,7 +53,7 @@ int validate(const RunOptions& options) {
 }  // namespace
 
 Action add_validate(cli::Parser& parser, const Words&) {
-  const auto o = std::make_shared<RunOptions>();
+  const auto o = std::make_shared<config::Sources>();
   const auto schema = std::make_shared<bool>(false);
   parser.add(
       {.names = "EXPERIMENT", .to = &o->experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});

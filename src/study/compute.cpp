@@ -9,6 +9,9 @@
 #include <memory>
 #include <utility>
 
+#include "abs_hil/control/registry.hpp"
+#include "config/library.hpp"
+#include "run/run_summary.hpp"
 #include "study/parallel.hpp"
 #include "study/runs.hpp"
 
@@ -59,6 +62,15 @@ namespace {
 /// Runs that are planned at once: enough for the threads to stay busy while the last runs of a chunk end.
 constexpr std::uint64_t runs_at_once = 8192;
 
+/// The study's own metrics of one run, from its records; the run goes on to the end of its experiment.
+std::vector<double> own_metrics(const Study& study, std::uint64_t number) {
+  const config::Settings s = settings_of_run(study, number);
+  const auto controller = control::make_controller(s.control.controller, {s.control, s.model});
+  SignalMetrics metrics(study.script().metrics, controller->signals(), s.plant.rig.wheels.r2_m);
+  static_cast<void>(run::simulate(s, *config::find(s.experiment.name), {&metrics}, [] { return rig::Reason::none; }));
+  return metrics.values();
+}
+
 /// A chunk that is being computed.
 struct OpenChunk {
   std::uint64_t number{0};
@@ -69,9 +81,9 @@ struct OpenChunk {
 
 class Computation {
  public:
-  Computation(const Study& study, const StudyFolder& folder, std::size_t threads, const OwnMetrics& own,
+  Computation(const Study& study, const StudyFolder& folder, std::size_t threads,
               std::function<void(std::uint64_t)> done)
-      : study_(study), folder_(folder), threads_(threads), own_(own), done_(std::move(done)) {}
+      : study_(study), folder_(folder), threads_(threads), done_(std::move(done)) {}
 
   /// @param first  number of the first chunk, of `count` with the same number of runs except for the last
   void run(const std::uint64_t* first, std::size_t count) {
@@ -90,7 +102,8 @@ class Computation {
     run_part(study_, runs, threads_, run_of, [&](std::size_t i, Outcome outcome) {
       OpenChunk& chunk = *open[i / size];
       count_in(outcome);
-      if (!study_.script().metrics.empty() && outcome.refusal.empty()) chunk.own[i % size] = own_(study_, run_of(i));
+      if (!study_.script().metrics.empty() && outcome.refusal.empty())
+        chunk.own[i % size] = own_metrics(study_, run_of(i));
       chunk.outcomes[i % size] = std::move(outcome);
       if (chunk.left.fetch_sub(1) == 1) write(chunk);
       const std::uint64_t finished = runs_.fetch_add(1) + 1;
@@ -122,7 +135,6 @@ class Computation {
   const Study& study_;
   const StudyFolder& folder_;
   std::size_t threads_;
-  const OwnMetrics& own_;
   std::function<void(std::uint64_t)> done_;
   std::atomic<std::uint64_t> runs_{0};
   std::atomic<std::uint64_t> faults_{0};
@@ -142,7 +154,7 @@ std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard
 }
 
 Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard, std::size_t threads,
-              const OwnMetrics& own, const Progress& progress) {
+              const Progress& progress) {
   const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
   std::uint64_t all = 0;
   for (const std::uint64_t chunk : chunks) all += study.runs_in(chunk);
@@ -150,7 +162,7 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
     if (progress) progress(done, all);
   };
   tell(0);
-  Computation computation(study, folder, threads > 0 ? threads : machine_threads(), own, tell);
+  Computation computation(study, folder, threads > 0 ? threads : machine_threads(), tell);
   const std::uint64_t at_once = std::max<std::uint64_t>(1, runs_at_once / study.script().chunk);
   for (std::size_t at = 0; at < chunks.size(); at += at_once) {
     computation.run(chunks.data() + at, std::min<std::size_t>(at_once, chunks.size() - at));

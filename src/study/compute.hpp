@@ -39,9 +39,6 @@ struct Tally {
   std::uint64_t refused{0};  ///< could not begin, for their combination of values
 };
 
-/// Computes the study's own metrics of a run: `SignalMetrics` over its records. Called from several threads.
-using OwnMetrics = std::function<std::vector<double>(const Study& study, std::uint64_t run)>;
-
 /// Tells how many of all runs that have to be computed are done. Called from several threads, after each run, and once
 /// before the first.
 using Progress = std::function<void(std::uint64_t done, std::uint64_t all)>;
@@ -49,9 +46,8 @@ using Progress = std::function<void(std::uint64_t done, std::uint64_t all)>;
 /// Computes the chunks of a shard that the folder lacks, and writes each as soon as it is finished. The bytes do not
 /// depend on the threads. Memory does not grow with the number of chunks.
 /// @param threads  0: one for each processor
-/// @param own  called for the runs of a study that has metrics of its own
 /// Throws std::runtime_error if a file cannot be written.
 Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard, std::size_t threads,
-              const OwnMetrics& own, const Progress& progress);
+              const Progress& progress);
 
 }  // namespace abs_hil::study

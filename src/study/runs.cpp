@@ -1,6 +1,8 @@
 // Settings of a study's runs, and batches of them.
 #include "study/runs.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -8,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "config/config_error.hpp"
 #include "config/key_table.hpp"
 
 namespace abs_hil::study {
@@ -87,6 +90,14 @@ config::Settings RunSettings::whole(const RunIndex& index) {
   settings.plant = std::move(own.plant);
   settings.sensor_seed = std::to_string(own.seed);
   return settings;
+}
+
+config::Settings settings_of_run(const Study& study, std::uint64_t number) {
+  if (number >= study.runs()) {
+    throw config::ConfigError(
+        fmt::format("--run {}: there are {} runs; give a number in [0, {}]", number, study.runs(), study.runs() - 1));
+  }
+  return RunSettings(study).whole(study.index_of(number));
 }
 
 namespace {

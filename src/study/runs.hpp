@@ -48,6 +48,9 @@ class RunSettings {
   std::optional<RunIndex> at_{};
 };
 
+/// The whole settings of one run of a study. Throws config::ConfigError unless the study has a run of this number.
+[[nodiscard]] config::Settings settings_of_run(const Study& study, std::uint64_t number);
+
 /// Runs some of a study's runs, in any order. The memory that it takes does not grow with `count`.
 /// @param run_of  the number of the run in the study, for index 0 to count - 1; called from several threads
 /// @param take  takes the outcome of that index; called from several threads. An exception of it ends the part and

@@ -12,6 +12,7 @@
 #include "analysis/run_metrics.hpp"
 #include "config/config_error.hpp"
 #include "config/library.hpp"
+#include "config/merge.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::study {
@@ -156,6 +157,27 @@ config::Value Study::value_of(const RunIndex& index, std::size_t factor) const {
   }
   const auto& values = std::get<Levels>(wanted.values).values;
   return values[rest % values.size()];
+}
+
+Study make_study(StudyScript script) {
+  std::vector<StudyCase> cases;
+  for (const std::string& plant : script.plants) {
+    for (const std::string& experiment : script.experiments) {
+      config::Sources sources{.plant = plant, .model = script.model, .experiment = experiment};
+      sources.defaults.emplace_back(start_speed_default);
+      for (const config::Setting& setting : script.settings) {
+        sources.changes.push_back({setting.key, setting.value, script.path});
+      }
+      sources.virtual_time = true;
+      config::Configuration merged = config::merge(sources);
+      if (merged.script->series.given) {
+        throw config::ConfigError(fmt::format(
+            "{}: experiment {} is a series of runs; name experiments without [series]", script.path, experiment));
+      }
+      cases.push_back({.plant = plant, .experiment = experiment, .settings = std::move(merged.settings)});
+    }
+  }
+  return {std::move(script), std::move(cases)};
 }
 
 }  // namespace abs_hil::study

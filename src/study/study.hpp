@@ -80,4 +80,10 @@ class Study {
   bool shares_settings_{false};
 };
 
+/// The paper brakes from 1625 rpm, 170 rad/s. Simulated studies begin there unless the configuration says otherwise.
+inline constexpr const char* start_speed_default = "experiment.start_speed_rad_s=170";
+
+/// The study with its plants and experiments looked up. Throws config::ConfigError and std::invalid_argument.
+[[nodiscard]] Study make_study(StudyScript script);
+
 }  // namespace abs_hil::study

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "config/config_file.hpp"
-#include "program/command_line.hpp"
+#include "config/merge.hpp"
 #include "rig/record_sink.hpp"
 #include "run/run_summary.hpp"
 #include "run_folder/run_folder.hpp"
@@ -43,7 +43,7 @@ class Records : public rig::RecordSink {
 std::string rows_of_run(const std::string& words) {
   std::istringstream text(words);
   const std::vector<std::string> options{std::istream_iterator<std::string>(text), {}};
-  const program::RunRequest request = program::merge(program::options_of(options));
+  const config::Configuration request = config::merge(config::sources_of(options));
   Records records;
   const run::Simulation simulation =
       run::simulate(request.settings, *request.script, {&records}, [] { return rig::Reason::none; });

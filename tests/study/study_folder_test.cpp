@@ -46,7 +46,7 @@ std::string results_of(const StudyFolder& folder) { return bytes_of(folder.path(
 /// Computes a shard and returns its number of chunks.
 std::size_t compute_shard(const Study& study, const StudyFolder& folder, Shard shard, std::size_t threads = 1) {
   const std::size_t chunks = missing_chunks(folder, shard).size();
-  static_cast<void>(compute(study, folder, shard, threads, {}, {}));
+  static_cast<void>(compute(study, folder, shard, threads, {}));
   return chunks;
 }
 

@@ -1,0 +1,330 @@
+// Merges what people and files say about a run. `fill` has the order of the sources; the checks beside it refuse what
+// contradicts.
+#include "config/merge.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "abs_hil/control/registry.hpp"
+#include "config/config_error.hpp"
+#include "config/key_table.hpp"
+#include "config/library.hpp"
+#include "config/model.hpp"
+#include "config/plan.hpp"
+#include "driver/injection/injection.hpp"
+#include "rig/nearest_name.hpp"
+#include "runtime/board_policy.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+constexpr const char* experiment_key = "experiment.name";
+
+/// The mode of --rt; none: real time is required on a real board, otherwise preferred.
+runtime::RealtimeMode realtime_mode(const std::optional<std::string>& name, const Settings& s) {
+  if (!name) {
+    const bool real = s.on_rig() && runtime::is_real_board(s.driver);
+    return real ? runtime::RealtimeMode::require : runtime::RealtimeMode::prefer;
+  }
+  if (*name == "require") return runtime::RealtimeMode::require;
+  return *name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
+}
+
+/// Logs a warning once: each run of a series is merged anew.
+void warn_once(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> logged;
+  const std::scoped_lock lock(mutex);
+  if (logged.insert(text).second) spdlog::warn("{}", text);
+}
+
+/// Refuses events that only a simulated plant can carry out, and fault injection into real hardware.
+void refuse_events(const Script& script, bool emulated) {
+  for (const EventScript& event : script.events) {
+    for (const ChangingPart& part : changing_parts()) {
+      if (!(event.*part.factor)) continue;
+      throw ConfigError(
+          fmt::format("{}: [[event]] {}: only a simulated plant can change on command; run experiment {} with "
+                      "--backend sim, or leave its events out for the rig",
+                      script.at(event.place), part.what, script.name));
+    }
+    if (!emulated) {
+      throw ConfigError(
+          fmt::format("{}: [[event]] inject: faults are never injected into real hardware; run experiment {} with "
+                      "--backend sim, or leave its events out for the rig",
+                      script.at(event.place), script.name));
+    }
+  }
+}
+
+/// A misspelt key in the list of consents consents to nothing, and somebody believes that it does.
+void check_consents(const Settings& s, const KeyTable& keys) {
+  std::vector<std::string_view> names;
+  for (const Key& key : keys.keys()) names.push_back(key.name);
+  for (std::size_t begin = 0; begin < s.unsafe.keys.size();) {
+    const std::size_t end = std::min(s.unsafe.keys.find(',', begin), s.unsafe.keys.size());
+    const std::string name = s.unsafe.keys.substr(begin, end - begin);
+    if (find_key(keys.keys(), name) == nullptr) {
+      throw ConfigError(fmt::format(
+          "unsafe.keys: unknown key \"{}\"; the nearest known key is {}; give keys separated by commas, without blanks",
+          name, fmt::join(rig::nearest_keys(name, names), " or ")));
+    }
+    begin = end + 1;
+  }
+}
+
+/// The policy of the board, after all settings are known.
+void apply_board_policy(Settings& s, const KeyTable& keys, bool virtual_time) {
+  check_consents(s, keys);
+  const std::vector<std::string> accepted = runtime::refuse_unsafe_use(
+      {.driver = s.driver,
+       .guarded = s.guardian.enabled,
+       .virtual_time = virtual_time,
+       .rate_Hz = s.control.rate_Hz,
+       .guardian_timeout_ms = s.guardian.timeout_ms,
+       .unsafe = s.unsafe,
+       .start_speed_rad_s = s.experiment.start_speed_rad_s,
+       .injections = driver::parse_injections(s.inject),
+       .controller_file = control::is_controller_file(s.control.controller) ? s.control.controller : "",
+       .weak = weak_values(keys),
+       .model_counts_per_rev = s.model.encoder_counts_per_rev,
+       .rig_counts_per_rev = s.rig.parameters.encoder_counts_per_rev});
+  for (const std::string& weak : accepted) warn_once(weak);
+  runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
+                                    .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
+                                   s.driver);
+  runtime::apply_board_limits(s.rig.parameters, s.control.rate_Hz, s.gate, s.driver);
+}
+
+/// The configuration files of a run, each read once.
+struct Files {
+  std::vector<FileValue> plant{};
+  std::vector<FileValue> model{};
+  std::vector<FileValue> config{};
+};
+
+Files read_files(const Sources& sources, const std::string& default_plant) {
+  const bool on_rig = sources.backend == "rig";
+  if (on_rig && sources.plant) {
+    throw ConfigError(fmt::format(
+        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *sources.plant));
+  }
+  const std::filesystem::path plant = plant_file(sources.plant.value_or(default_plant));
+  Files files{.plant = on_rig ? read_model(plant) : read_file(plant, Tables::of_plant)};
+  if (sources.model) files.model = read_model(plant_file(*sources.model, "--model"));
+  if (sources.config_file) files.config = read_file(*sources.config_file);
+  return files;
+}
+
+std::vector<FileValue> settings_of(const Script& script) {
+  std::vector<FileValue> values;
+  for (const Setting& setting : script.settings) {
+    values.push_back({setting.key, setting.value, script.at(setting.place)});
+  }
+  return values;
+}
+
+/// The names of plant and model. On a rig the plant's name is the model's.
+void set_names(Settings& s, const Sources& sources) {
+  if (sources.plant) s.plant_name = *sources.plant;
+  if (sources.model) s.model_name = *sources.model;
+  if (!s.on_rig()) return;
+  if (!sources.model) s.model_name = s.plant_name;
+  s.plant_name = s.model_name;
+}
+
+/// What nobody has set of the rig's identity comes from the file that it names: from its [plant], which describes a
+/// rig, before its [model].
+void complete_identity(const Settings& s, KeyTable& keys) {
+  const std::vector<FileValue> values = read_file(plant_file(s.rig.source, "rig.identity"), Tables::of_plant);
+  for (const std::string_view table : {"plant.", "model."}) {
+    for (const FileValue& value : values) {
+      if (!value.name.starts_with(table)) continue;
+      const std::string name = "rig." + value.name.substr(table.size());
+      if (find_key(keys.keys(), name) != nullptr && !keys.was_set(name)) keys.set(name, value.value, value.origin);
+    }
+  }
+}
+
+/// Everything but what the script asks for beyond its settings.
+void fill(Settings& s, KeyTable& keys, const Sources& sources, const Files& files, const Script& script) {
+  s.backend = sources.backend;
+  if (s.on_rig()) keys.leave_out_plant();
+  for (const std::string& assignment : sources.defaults) keys.set_text(assignment, "default");
+  set_names(s, sources);
+  set_all(files.plant, keys);
+  set_all(files.model, keys);
+  set_all(settings_of(script), keys);
+  set_all(files.config, keys);
+
+  const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
+    if (value) keys.set_text(std::string(key) + '=' + *value, option);
+  };
+  set("control.controller", sources.controller, "--controller");
+  set(experiment_key, sources.experiment, "--experiment");
+  set("control.slip_ref", sources.slip_ref, "--slip-ref");
+  set("control.rate_Hz", sources.rate_Hz, "--rate");
+  set("run.seed", sources.seed, "--seed");
+  for (const std::string& assignment : sources.assignments) keys.set_text(assignment, "--set");
+  set_all(sources.changes, keys);
+  for (const std::string& injection : sources.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
+  if (sources.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
+  if (s.on_rig()) complete_identity(s, keys);
+  s.realtime.mode = realtime_mode(sources.realtime, s);
+}
+
+/// The experiment that options and files name: its script's settings rank below theirs, so it must be known before they
+/// are set. A name that is no text is refused when it is set.
+std::shared_ptr<const Script> script_of(const Sources& sources, const Files& files) {
+  std::string name = experiment::ExperimentOptions().name;
+  const auto look = [&name](const std::vector<FileValue>& values) {
+    for (const FileValue& value : values) {
+      if (const auto* text = std::get_if<std::string>(&value.value); text != nullptr && value.name == experiment_key)
+        name = *text;
+    }
+  };
+  const auto look_at_texts = [&](const std::vector<std::string>& assignments) {
+    for (const std::string& assignment : assignments) {
+      const auto [key, text] = split_assignment(assignment, "--set");
+      if (key == experiment_key) name = text;
+    }
+  };
+  look_at_texts(sources.defaults);
+  look(files.config);
+  name = sources.experiment.value_or(name);
+  look_at_texts(sources.assignments);
+  look(sources.changes);
+  std::shared_ptr<const Script> script = find(name);
+  if (!sources.one_of_series) return script;
+  auto single = std::make_shared<Script>(*script);
+  single->series.given = false;
+  return single;
+}
+
+/// Everything but the texts of the configuration.
+void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
+  Settings& s = merged.settings;
+  const Files files = read_files(sources, s.plant_name);
+  merged.script = script_of(sources, files);
+  const Script& script = *merged.script;
+  fill(s, keys, sources, files, script);
+  if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
+    throw ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
+  }
+  if (s.on_rig()) refuse_events(script, s.driver.emulated);
+  apply(script, s);
+  static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
+  if (s.on_rig()) apply_board_policy(s, keys, sources.virtual_time);
+  for (const std::string& problem : theta_out_of_bounds(s)) warn_once(problem);
+  for (const std::string& problem : negative_at_dead_zone(s)) warn_once(problem);
+  if (const std::string problem = standstill_too_early(s); !problem.empty()) warn_once(problem);
+  if (const std::string problem = slip_out_of_reach(script, s); !problem.empty()) warn_once(problem);
+  if (!asks(script)) return;
+  if (s.experiment.answers == "auto") s.experiment.answers = sources.asked;
+  if (sources.virtual_time && s.experiment.answers == experiment::answers_person) {
+    throw ConfigError(
+        fmt::format("experiment {} asks a person: a run in virtual time (--fast) cannot wait; leave out --fast, or "
+                    "experiment.answers = person",
+                    script.name));
+  }
+}
+
+/// The texts of the configuration.
+void write_texts(Configuration& merged, const KeyTable& keys) {
+  const Settings& s = merged.settings;
+  nlohmann::ordered_json json = keys.to_json();
+  json["experiment_script"] = merged.script->text;
+  if (!merged.script->files.empty()) json["experiment_files"] = merged.script->files;
+  merged.json = json.dump();
+  const std::string plant = s.on_rig() ? "" : " --plant " + s.plant_name;
+  const std::string model = s.model_name.empty() ? "" : " --model " + s.model_name;
+  merged.toml = fmt::format(
+      "# Effective configuration of a run. To run it again: abs_hil --backend {}{}{} --config THIS_FILE\n{}", s.backend,
+      plant, model, keys.to_toml());
+}
+
+}  // namespace
+
+Configuration merge(const Sources& sources) {
+  Configuration merged;
+  KeyTable keys(merged.settings);
+  merge_into(merged, keys, sources);
+  write_texts(merged, keys);
+  return merged;
+}
+
+Settings merged_settings(const Sources& sources) {
+  Configuration merged;
+  KeyTable keys(merged.settings);
+  merge_into(merged, keys, sources);
+  return std::move(merged.settings);
+}
+
+Configuration configuration_of(Settings settings) {
+  Configuration made{.settings = std::move(settings)};
+  const Settings& s = made.settings;
+  made.script = find(s.experiment.name);
+  KeyTable keys(made.settings);
+  // The whole model, so that its values follow neither a plant nor a model's file when the configuration is read again.
+  const bool differs = !s.model_name.empty() || s.model != s.plant.rig;
+  for (const Key& key : keys.keys()) {
+    if (!differs || !key.name.starts_with("model.")) continue;
+    std::visit([&](const auto* value) { keys.set(key.name, *value, "model"); }, key.target);
+  }
+  write_texts(made, keys);
+  return made;
+}
+
+Sources sources_of(const std::vector<std::string>& words) {
+  Sources sources{.virtual_time = true};
+  const std::map<std::string_view, std::optional<std::string>*> named{
+      {"--config", &sources.config_file}, {"--controller", &sources.controller}, {"--experiment", &sources.experiment},
+      {"--model", &sources.model},        {"--plant", &sources.plant},           {"--seed", &sources.seed},
+      {"--slip-ref", &sources.slip_ref}};
+  for (std::size_t n = 0; n + 1 < words.size(); n += 2) {
+    if (words[n] == "--set") {
+      sources.assignments.push_back(words[n + 1]);
+    } else if (const auto known = named.find(words[n]); known != named.end()) {
+      *known->second = words[n + 1];
+    } else {
+      throw ConfigError("a run from words has no option " + words[n]);
+    }
+  }
+  return sources;
+}
+
+void choose(const SeriesMember& member, Sources& sources) {
+  for (const auto& [key, value] : member.varied) sources.changes.push_back({key, value, "[vary]"});
+  sources.changes.push_back({"run.seed", member.seed, "[series]"});
+  // An experiment that the series names is a script of its own: refuse_nested sees whether that is a series, too.
+  sources.one_of_series =
+      std::ranges::none_of(member.varied, [](const auto& varied) { return varied.first == experiment_key; });
+}
+
+nlohmann::ordered_json varied_json(const SeriesMember& member) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [key, value] : member.varied) {
+    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
+  }
+  return json;
+}
+
+void refuse_nested(const Script& series, const Script& experiment) {
+  if (!experiment.series.given) return;
+  throw ConfigError(fmt::format("{}: {} is a series, too; name single experiments", series.path, experiment.name));
+}
+
+bool asks(const Script& script) noexcept {
+  return std::ranges::any_of(script.phases, [](const PhaseScript& phase) { return !phase.ask.empty(); });
+}
+
+}  // namespace abs_hil::config
