@@ -4,10 +4,7 @@
 #include <vector>
 
 #include "abs_hil/driver/backend.hpp"
-#include "driver/can/can_backend.hpp"
-#include "driver/hm2/hm2_backend.hpp"
-#include "driver/pci/pci_backend.hpp"
-#include "driver/usb/usb_backend.hpp"
+#include "driver/board_options.hpp"
 
 namespace abs_hil::driver {
 

@@ -15,6 +15,7 @@
 #include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "rig/encoder_scale.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver {
 
@@ -42,12 +43,12 @@ inline void check_sign(const std::string& key, std::int32_t sign) {
   throw std::invalid_argument(key + " = " + std::to_string(sign) + ": give 1 or -1");
 }
 
-/// Throws std::invalid_argument, naming the keys, if both wheels have the same encoder channel.
+/// Throws std::invalid_argument, naming the keys, if both have the same value.
 /// @param board  prefix of the keys, "driver.pci."
-inline void check_channels(const std::string& board, std::int32_t lower, std::int32_t upper) {
-  if (lower != upper) return;
-  throw std::invalid_argument(board + "lower_channel = " + board + "upper_channel = " + std::to_string(upper) +
-                              ": each wheel has an encoder of its own");
+inline void check_different(const std::string& board, const char* first, std::int32_t of_first, const char* second,
+                            std::int32_t of_second, const char* why) {
+  if (of_first != of_second) return;
+  throw std::invalid_argument(board + first + " = " + board + second + " = " + std::to_string(of_second) + ": " + why);
 }
 
 /// Throws std::invalid_argument, naming the key, if an option is outside its range.
@@ -56,8 +57,14 @@ void check_options(const std::string& board, const Options& options) {
   rig::require_valid(options, board);
   check_sign(board + "lower_sign", options.lower_sign);
   check_sign(board + "upper_sign", options.upper_sign);
-  if constexpr (requires { options.lower_channel; })
-    check_channels(board, options.lower_channel, options.upper_channel);
+  if constexpr (requires { options.lower_channel; }) {
+    check_different(board, "lower_channel", options.lower_channel, "upper_channel", options.upper_channel,
+                    "each wheel has an encoder of its own");
+  }
+  if constexpr (requires { options.drive_pwm; }) {
+    check_different(board, "drive_pwm", options.drive_pwm, "brake_pwm", options.brake_pwm,
+                    "drive and brake need different PWMs");
+  }
 }
 
 /// False if a duty is not in [0, 1], the torque is < 0, or a value is not finite.
@@ -81,21 +88,37 @@ void check_options(const std::string& board, const Options& options) {
                                               : raw);  // unsigned arithmetic: the most negative count has no negative
 }
 
-/// Most counts that a counter can move in `elapsed_ns`, which is >= 0, at a speed of at most `speed_rad_s`.
-[[nodiscard]] inline double most_plausible_counts(std::int64_t elapsed_ns, double speed_rad_s,
-                                                  std::int32_t counts_per_rev) noexcept {
+/// True if a counter can have moved from `before` to `after` in `elapsed_ns`, which is >= 0, at the options' largest
+/// plausible speed.
+template <class Options>
+[[nodiscard]] bool plausible_travel(std::int32_t before, std::int32_t after, std::int64_t elapsed_ns,
+                                    const Options& options) noexcept {
   /// Counts allowed in addition to what the speed explains, because of vibration, late reads and delays on a bus.
   constexpr double slack_counts = 256.0;
-  return slack_counts +
-         speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns / rig::radians_per_count(counts_per_rev);
+  const double most = slack_counts + options.plausible_speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns /
+                                         rig::radians_per_count(options.encoder_counts_per_rev);
+  return std::abs(static_cast<double>(rig::counts_between(before, after))) <= most;
 }
 
-/// True if a counter can have moved from `before` to `after` in `elapsed_ns`, which is >= 0.
-/// @param speed_rad_s largest plausible speed
-[[nodiscard]] inline bool plausible_travel(std::int32_t before, std::int32_t after, std::int64_t elapsed_ns,
-                                           double speed_rad_s, std::int32_t counts_per_rev) noexcept {
-  return std::abs(static_cast<double>(rig::counts_between(before, after))) <=
-         most_plausible_counts(elapsed_ns, speed_rad_s, counts_per_rev);
+/// The count after `moved` more; it wraps.
+[[nodiscard]] inline std::int32_t counts_after(std::int32_t counts, std::int32_t moved) noexcept {
+  return std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(counts) + std::bit_cast<std::uint32_t>(moved));
+}
+
+/// How long a cycle waits for the board's answer, ns: at most 80 % of the period. Throws std::invalid_argument, naming
+/// the key.
+/// @param share  of the period, if the options give no time
+template <class Options>
+[[nodiscard]] std::int64_t answer_timeout_ns(const std::string& board, const Options& options, double share) {
+  constexpr double most_share = 0.8;
+  const double period_us = 1e6 / options.rate_Hz;
+  if (options.answer_timeout_us > most_share * period_us) {
+    throw std::invalid_argument(
+        rig::formatted("%sanswer_timeout_us = %d: give at most %.0f us (80 %% of the period), or 0 for %.0f %% of it",
+                       board.c_str(), options.answer_timeout_us, most_share * period_us, 100.0 * share));
+  }
+  const double us = options.answer_timeout_us > 0 ? options.answer_timeout_us : share * period_us;
+  return static_cast<std::int64_t>(us * static_cast<double>(rig::ns_per_us));
 }
 
 /// The clock of an emulated board in lock-step: it advances only when the driver says so. No hardware has such a clock.

@@ -2,11 +2,8 @@
 // so that every platform reads every configuration; a driver is not.
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/can/can_backend.hpp"
-#include "driver/hm2/hm2_backend.hpp"
-#include "driver/pci/pci_backend.hpp"
+#include "driver/board_options.hpp"
 #include "driver/pwm.hpp"
-#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver {
 

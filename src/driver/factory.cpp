@@ -64,9 +64,11 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
   return chosen.entry.make_driver(chosen.options, options.facts(lock_step));
 }
 
-std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options) {
+std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options, bool beside_guardian) {
   const ChosenBackend chosen = chosen_backend(options);
-  return chosen.entry.make_safe_state_writer(chosen.options, options.facts());
+  RunFacts facts = options.facts();
+  facts.beside_guardian = beside_guardian;
+  return chosen.entry.make_safe_state_writer(chosen.options, facts);
 }
 
 BoardReality reality_of(const DriverOptions& options) {

@@ -12,7 +12,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/rig/option.hpp"
-#include "driver/board_rows.hpp"
+#include "driver/board_options.hpp"
 
 namespace abs_hil::driver {
 
@@ -110,7 +110,9 @@ struct ChosenBackend {
 
 /// Makes the writer of the safe state for the board that `options.kind` names. Throws Unavailable for a kind that no
 /// backend has.
-[[nodiscard]] std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options);
+/// @param beside_guardian  it works although a guardian keeps the board
+[[nodiscard]] std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options,
+                                                                      bool beside_guardian = false);
 
 /// What the options of the chosen board lead to. Throws Unavailable for a kind that no backend has.
 [[nodiscard]] BoardReality reality_of(const DriverOptions& options);

@@ -1,4 +1,4 @@
-// Facts about devices in the kernel's files (sysfs).
+// Facts about devices and processes in the kernel's files (sysfs, /proc).
 
 #pragma once
 
@@ -18,6 +18,9 @@ namespace abs_hil::driver {
   std::getline(in, line);
   return line;
 }
+
+/// Name of a process; empty if unknown.
+[[nodiscard]] inline std::string process_name(long pid) { return line_in("/proc/" + std::to_string(pid) + "/comm"); }
 
 /// The number that a file begins with; 0 if it cannot be read. Base 16 allows "0x10b5" as well as "10b5".
 [[nodiscard]] inline std::uint32_t number_in(const std::filesystem::path& file, int base) {

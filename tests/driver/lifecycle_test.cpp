@@ -5,11 +5,9 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "catch.hpp"
-#include "driver/can/can_backend.hpp"
+#include "driver/board_options.hpp"
 #include "driver/factory.hpp"
 #include "driver/hm2/hm2_driver.hpp"
-#include "driver/pci/pci_backend.hpp"
-#include "driver/usb/usb_backend.hpp"
 
 using namespace abs_hil::driver;
 using abs_hil::rig::Command;

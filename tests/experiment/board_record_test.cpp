@@ -5,7 +5,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
-#include "driver/pci/pci_backend.hpp"
+#include "driver/board_options.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil;

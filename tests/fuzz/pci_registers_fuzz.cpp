@@ -81,8 +81,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const std::int64_t since_ns = m.time_ns - before.time_ns;
       // The counters before the first read are those of activation, at most their slack away from 0.
       const std::int64_t elapsed_ns = first ? 200 * ms : since_ns;
-      expect(plausible_travel(before.upper_counts, m.upper_counts, elapsed_ns, options.plausible_speed_rad_s, 4096));
-      expect(plausible_travel(before.lower_counts, m.lower_counts, elapsed_ns, options.plausible_speed_rad_s, 4096));
+      expect(plausible_travel(before.upper_counts, m.upper_counts, elapsed_ns, options));
+      expect(plausible_travel(before.lower_counts, m.lower_counts, elapsed_ns, options));
       first = false;
       before = m;
     } else {

@@ -93,8 +93,7 @@ void run_driver(Input& input) {
     expect(m.trip_flags == 0 && std::isnan(m.supply_V) && std::isnan(m.temperature_C) && !m.ideal_speeds);
     for (const auto& [was, is] :
          {std::pair(before.upper_counts, m.upper_counts), std::pair(before.lower_counts, m.lower_counts)}) {
-      expect(plausible_travel(was, is, m.time_ns - before.time_ns, options.plausible_speed_rad_s,
-                              options.encoder_counts_per_rev));
+      expect(plausible_travel(was, is, m.time_ns - before.time_ns, options));
     }
     before = m;
     static_cast<void>(driver.write({.brake_duty = static_cast<double>(input.byte()) / 255.0}));

@@ -5,9 +5,7 @@
 #include <string>
 
 #include "catch.hpp"
-#include "driver/can/can_backend.hpp"
-#include "driver/pci/pci_backend.hpp"
-#include "driver/usb/usb_backend.hpp"
+#include "driver/board_options.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;

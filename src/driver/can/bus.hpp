@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "driver/can/can_backend.hpp"
+#include "driver/board_options.hpp"
 #include "driver/can/interface_facts.hpp"
 #include "driver/can/protocol.hpp"
 #include "driver/file_descriptor.hpp"

@@ -19,20 +19,10 @@ namespace {
 constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
 /// Share of the period to wait for an answer. The controller and the command need the rest.
 constexpr double answer_share = 0.6;
-constexpr double most_answer_share = 0.8;
 
-std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
-  const double period_ns = 1e9 / options.rate_Hz;
-  const std::int64_t timeout_ns = options.answer_timeout_us * rig::ns_per_us;
-  if (lock_step) return timeout_ns > 0 ? timeout_ns : lock_step_timeout_ns;
-  if (timeout_ns == 0) return static_cast<std::int64_t>(answer_share * period_ns);
-  if (timeout_ns < 0 || static_cast<double>(timeout_ns) > most_answer_share * period_ns) {
-    throw std::invalid_argument(
-        "driver.can.answer_timeout_us = " + std::to_string(options.answer_timeout_us) + ": give at most " +
-        std::to_string(static_cast<std::int64_t>(most_answer_share * period_ns) / rig::ns_per_us) +
-        " us (80 % of the period), or 0 for the default of 60 %");
-  }
-  return timeout_ns;
+std::int64_t answer_timeout_of(const CanOptions& options, bool lock_step) {
+  if (!lock_step) return answer_timeout_ns("driver.can.", options, answer_share);
+  return options.answer_timeout_us > 0 ? options.answer_timeout_us * rig::ns_per_us : lock_step_timeout_ns;
 }
 
 }  // namespace
@@ -42,7 +32,7 @@ CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_st
       grid_(output_grid(options)),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
-      answer_timeout_ns_(answer_timeout_ns(options, lock_step)),
+      answer_timeout_ns_(answer_timeout_of(options, lock_step)),
       bucket_(options.loss_cost, options.loss_relief, options.loss_limit) {
   check_options("driver.can.", options);
 }

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_options.hpp"
 #include "driver/can/answer_tracker.hpp"
 #include "driver/can/bus.hpp"
-#include "driver/can/can_backend.hpp"
 #include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 

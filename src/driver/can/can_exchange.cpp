@@ -171,13 +171,10 @@ bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) no
   const std::array<std::int32_t, 2> raw{static_cast<std::int32_t>(answer.values.upper_counts),
                                         static_cast<std::int32_t>(answer.values.lower_counts)};
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
-  const double most =
-      most_plausible_counts(elapsed_ns, options_.plausible_speed_rad_s, options_.encoder_counts_per_rev);
   for (std::size_t wheel = 0; wheel < raw.size(); ++wheel) {
     const std::int32_t moved = travelled(raw_counts_[wheel], raw[wheel], answer.count_bits);
-    if (std::abs(static_cast<double>(moved)) > most) return false;
-    const auto step = static_cast<std::uint32_t>(moved) * static_cast<std::uint32_t>(signs[wheel]);
-    counts_[wheel] = std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(counts_[wheel]) + step);
+    if (!plausible_travel(0, moved, elapsed_ns, options_)) return false;
+    counts_[wheel] = counts_after(counts_[wheel], moved * signs[wheel]);
   }
   raw_counts_ = raw;
   return true;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "driver/hm2/hm2_backend.hpp"
+#include "driver/board_options.hpp"
 #include "driver/hm2/wire.hpp"
 
 namespace abs_hil::driver::hm2 {

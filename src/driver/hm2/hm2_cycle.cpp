@@ -138,16 +138,12 @@ IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns)
   for (std::size_t wheel = 0; wheel < 2 && any_answer_; ++wheel) {
     const auto step = static_cast<std::uint16_t>(static_cast<std::uint16_t>(answer.count[wheel]) - raw_counts_[wheel]);
     moved[wheel] = std::bit_cast<std::int16_t>(step) * signs[wheel];
-    if (!plausible_travel(0, moved[wheel], time_ns - last_.time_ns, options_.plausible_speed_rad_s,
-                          options_.encoder_counts_per_rev)) {
+    if (!plausible_travel(0, moved[wheel], time_ns - last_.time_ns, options_)) {
       return {IoError::implausible_answer, wire_.count[wheel], 0, rig::Reason::hm2_values_implausible};
     }
   }
-  const auto sum = [](std::int32_t a, std::int32_t b) {
-    return std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(a) + std::bit_cast<std::uint32_t>(b));
-  };
-  last_.upper_counts = sum(last_.upper_counts, moved[0]);
-  last_.lower_counts = sum(last_.lower_counts, moved[1]);
+  last_.upper_counts = counts_after(last_.upper_counts, moved[0]);
+  last_.lower_counts = counts_after(last_.lower_counts, moved[1]);
   const std::int64_t since_ns = time_ns - last_.time_ns;
   last_.upper_edge_age_ns = edge_age_ns(answer, 0, moved[0] != 0, since_ns, last_.upper_edge_age_ns);
   last_.lower_edge_age_ns = edge_age_ns(answer, 1, moved[1] != 0, since_ns, last_.lower_edge_age_ns);

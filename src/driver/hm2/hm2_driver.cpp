@@ -27,18 +27,6 @@ constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
 constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
 constexpr std::uint32_t filter_at_25_MHz = 2;
 
-std::int64_t answer_timeout_ns(const Hm2Options& options) {
-  const double most_us = answer_share * 1e6 / options.rate_Hz;
-  if (options.answer_timeout_us > most_us) {
-    throw std::invalid_argument(
-        formatted("driver.hm2.answer_timeout_us = %d: give at most %.0f us (80 %% of the "
-                  "period), or 0 for that",
-                  options.answer_timeout_us, most_us));
-  }
-  const double us = options.answer_timeout_us > 0 ? options.answer_timeout_us : most_us;
-  return static_cast<std::int64_t>(us * static_cast<double>(rig::ns_per_us));
-}
-
 std::uint32_t pwm_rate(const Hm2Options& options, const Board& board) {
   constexpr double rate_steps = 65536.0;
   return static_cast<std::uint32_t>(options.pwm_frequency_Hz * rate_steps * pwm_steps / board.pwm.clock_Hz);
@@ -72,13 +60,8 @@ Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock re
       open_link_(std::move(open_link)),
       read_clock_(lock_step ? nullptr : read_clock),
       lock_step_(lock_step),
-      answer_timeout_ns_(answer_timeout_ns(options)) {
+      answer_timeout_ns_(answer_timeout_ns("driver.hm2.", options, answer_share)) {
   check_options("driver.hm2.", options);
-  if (options.drive_pwm == options.brake_pwm) {
-    throw std::invalid_argument(
-        formatted("driver.hm2.drive_pwm = driver.hm2.brake_pwm = %d: drive and brake need different PWM instances",
-                  options.brake_pwm));
-  }
 }
 
 Hm2Driver::~Hm2Driver() { static_cast<void>(deactivate()); }

@@ -12,8 +12,8 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_options.hpp"
 #include "driver/hm2/board.hpp"
-#include "driver/hm2/hm2_backend.hpp"
 #include "driver/loss_bucket.hpp"
 
 namespace abs_hil::driver::hm2 {

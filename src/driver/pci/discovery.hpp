@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "driver/pci/pci_backend.hpp"
+#include "driver/board_options.hpp"
 #include "driver/pci/register_window.hpp"
 
 namespace abs_hil::driver::pci {

@@ -177,10 +177,7 @@ void PciDriver::read_health(Access& card, std::size_t which) noexcept {
 
 bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept {
   for (std::size_t wheel = 0; wheel < counts_.size(); ++wheel) {
-    if (!plausible_travel(before[wheel], counts_[wheel], read_ns - last_read_ns_, options_.plausible_speed_rad_s,
-                          options_.encoder_counts_per_rev)) {
-      return false;
-    }
+    if (!plausible_travel(before[wheel], counts_[wheel], read_ns - last_read_ns_, options_)) return false;
   }
   return true;
 }

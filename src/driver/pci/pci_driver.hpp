@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_options.hpp"
 #include "driver/pci/discovery.hpp"
-#include "driver/pci/pci_backend.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pwm.hpp"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "driver/board_options.hpp"
 #include "driver/own_handle_writer.hpp"
-#include "driver/pci/pci_backend.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pci/register_window.hpp"
 

@@ -13,6 +13,8 @@
 #include <fstream>
 #include <string>
 
+#include "driver/sysfs.hpp"
+
 namespace abs_hil::driver::pci {
 
 static_assert(std::endian::native == std::endian::little, "PCI registers and the kernel's files are little-endian");
@@ -20,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "PCI registers and the
 namespace {
 
 [[noreturn]] void refuse_file(const std::filesystem::path& file, const std::string& problem) {
-  throw Unavailable("backend rig: " + file.string() + ": " + problem);
+  refuse(file.string() + ": " + problem);
 }
 
 int open_for_access(const std::filesystem::path& file) {
@@ -32,14 +34,6 @@ int open_for_access(const std::filesystem::path& file) {
                           "): install config/udev/70-abs-hil.rules and join the group abs_hil (docs/rig-setup.md)");
   }
   refuse_file(file, std::string("cannot be opened: ") + std::strerror(error));
-}
-
-/// Name of a process from /proc; empty if unknown.
-std::string process_name(long pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
-  std::string name;
-  std::getline(file, name);
-  return name;
 }
 
 /// The process that holds the flock of an open file, from /proc/locks ("7: FLOCK ADVISORY WRITE 4711 00:3a:42 0 EOF").

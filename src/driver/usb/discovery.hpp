@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "driver/usb/usb_backend.hpp"
+#include "driver/board_options.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -10,7 +10,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"
-#include "driver/usb/usb_backend.hpp"
+#include "driver/board_options.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -108,6 +108,7 @@ struct Contents {
   PwmWords drive{};
   PwmWords brake{};
   std::uint16_t digital_out{0};  ///< lines 0 ... 15
+  std::int64_t read_ns{0};       ///< when the counters were read; not of the frame
 };
 /// Parses a frame. For any length other than 504 it returns `incomplete_answer` and leaves `contents` unchanged.
 /// Real-time safe.

@@ -60,7 +60,7 @@ namespace {
 constexpr std::int64_t give_up_ns = rig::ns_per_s;
 
 [[noreturn]] void refuse_device(const UsbDevice& device, const std::string& what) {
-  throw Unavailable("backend rig: USB board " + device.text() + ": " + what);
+  refuse("USB board " + device.text() + ": " + what);
 }
 
 /// Refuses the device if `result` is -errno.

@@ -1,4 +1,4 @@
-// Texts about the board.
+// Lifecycle and cycle of the driver.
 
 #include "driver/usb/usb_driver.hpp"
 
@@ -8,7 +8,6 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
-#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -41,17 +40,9 @@ UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock 
       open_board_(std::move(open_board)),
       read_clock_(read_clock) {
   check_options("driver.usb.", options);
-  if (options.drive_pwm == options.brake_pwm) {
-    throw std::invalid_argument("driver.usb.drive_pwm = driver.usb.brake_pwm = " + std::to_string(options.brake_pwm) +
-                                ": drive and brake need different PWM channels");
-  }
 }
 
 UsbDriver::~UsbDriver() { static_cast<void>(deactivate()); }
-
-std::int64_t UsbDriver::clock_ns(std::int64_t otherwise) const noexcept {
-  return read_clock_ == nullptr ? otherwise : read_clock_();
-}
 
 void UsbDriver::do_configure() {
   board_ = {};  // releases the board if this driver has claimed it
@@ -88,18 +79,18 @@ IoResult UsbDriver::checked(const Contents& contents) const noexcept {
   return shows(contents, sent_, options_) ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};
 }
 
-IoResult UsbDriver::fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept {
+IoResult UsbDriver::fresh_frame(std::int64_t timeout_ns, Contents& contents) noexcept {
   FrameLink& link = *board_.link;
   std::span<const std::uint8_t> bytes;
   const std::int64_t deadline_ns = clock_ns(0) + timeout_ns;
   if (link.answer_outstanding()) {
     if (const IoResult late = link.receive(timeout_ns, bytes); !late.ok()) return late;
   }
-  const std::int64_t asked_ns = clock_ns(read_ns);
+  const std::int64_t asked_ns = clock_ns(contents.read_ns);
   if (const IoResult result = link.request(); !result.ok()) return result;
   const std::int64_t left_ns = deadline_ns - clock_ns(0);
   if (const IoResult result = link.receive(left_ns > 0 ? left_ns : 0, bytes); !result.ok()) return result;
-  read_ns = asked_ns + (clock_ns(asked_ns) - asked_ns) / 2;
+  contents.read_ns = asked_ns + (clock_ns(asked_ns) - asked_ns) / 2;
   if (const IoError error = decode(bytes, options_, contents); error != IoError::none) return {error, endpoint_in};
   return checked(contents);
 }
@@ -110,8 +101,7 @@ IoResult UsbDriver::send_safe() noexcept {
   if (result.ok()) result = board_.link->flush(patient_ns);
   if (!result.ok() || !options_.verify_outputs) return result;
   Contents contents;
-  std::int64_t ignored = 0;
-  return fresh_frame(patient_ns, contents, ignored);
+  return fresh_frame(patient_ns, contents);
 }
 
 IoResult UsbDriver::take_over(Contents& contents) noexcept {
@@ -122,8 +112,7 @@ IoResult UsbDriver::take_over(Contents& contents) noexcept {
   IoResult result = board_.link->send(frame_);
   if (result.ok()) result = board_.link->flush(patient_ns);
   if (result.ok()) result = send_safe();
-  std::int64_t ignored = 0;
-  if (result.ok()) result = fresh_frame(patient_ns, contents, ignored);
+  if (result.ok()) result = fresh_frame(patient_ns, contents);
   return result;
 }
 
@@ -143,18 +132,12 @@ void UsbDriver::do_activate(std::int64_t now_ns) {
     if (result.error == IoError::read_back_mismatch) {
       text +=
           ". Its frames do not show the PWM words that were sent. It is not known whether the real board shows them. "
-          "If "
-          "yours does not, set driver.usb.verify_outputs=false; the safe state is then sent but never verified";
+          "If yours does not, set driver.usb.verify_outputs=false; the safe state is then sent but never verified";
     }
     throw Unavailable(text);
   }
   last_ = {};
   last_.time_ns = now_ns;
-}
-
-void UsbDriver::take_counts(const Contents& contents, std::array<std::int32_t, 2>& counts) const noexcept {
-  counts = {with_sign(contents.upper_raw - zero_.upper_raw, options_.upper_sign),
-            with_sign(contents.lower_raw - zero_.lower_raw, options_.lower_sign)};
 }
 
 IoResult UsbDriver::lost_frame() noexcept {
@@ -170,8 +153,7 @@ IoResult UsbDriver::failed(const IoResult& result) noexcept {
   if (result.error != IoError::read_back_mismatch) return with_reason(result);
   // A board that shows the zeros takes what is sent: what it showed before, something else had sent.
   Contents contents;
-  std::int64_t ignored = 0;
-  const bool takes_zeros = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents, ignored).ok();
+  const bool takes_zeros = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents).ok();
   return takes_zeros ? IoResult{IoError::foreign_writer, endpoint_in, 0, rig::Reason::foreign_writer}
                      : with_reason(result);
 }
@@ -182,28 +164,25 @@ IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
     const IoResult result = board_.time->follow(now_ns);
     if (!result.ok()) return with_reason(result);
   }
-  Contents contents;
-  std::int64_t read_ns = now_ns;
-  IoResult result = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents, read_ns);
+  Contents contents{.read_ns = now_ns};
+  IoResult result = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents);
   if (result.error == IoError::no_answer) {
     measurement = last_;
     lost_this_cycle_ = true;
     return lost_frame();
   }
   if (!result.ok()) return failed(result);
-  std::array<std::int32_t, 2> counts{};
-  take_counts(contents, counts);
-  const auto plausible = [&](std::int32_t before, std::int32_t after) {
-    return plausible_travel(before, after, read_ns - last_.time_ns, options_.plausible_speed_rad_s,
-                            options_.encoder_counts_per_rev);
-  };
-  if (!plausible(last_.upper_counts, counts[0]) || !plausible(last_.lower_counts, counts[1])) {
+  const std::int32_t upper = with_sign(contents.upper_raw - zero_.upper_raw, options_.upper_sign);
+  const std::int32_t lower = with_sign(contents.lower_raw - zero_.lower_raw, options_.lower_sign);
+  const std::int64_t elapsed_ns = contents.read_ns - last_.time_ns;
+  if (!plausible_travel(last_.upper_counts, upper, elapsed_ns, options_) ||
+      !plausible_travel(last_.lower_counts, lower, elapsed_ns, options_)) {
     return failed({IoError::implausible_answer, endpoint_in});
   }
   bucket_.good();
-  last_.time_ns = read_ns;
-  last_.upper_counts = counts[0];
-  last_.lower_counts = counts[1];
+  last_.time_ns = contents.read_ns;
+  last_.upper_counts = upper;
+  last_.lower_counts = lower;
   measurement = last_;  // the generic logic has no values of supply, temperature and interlocks
   return {};
 }
@@ -231,8 +210,7 @@ BoardIdentity UsbDriver::identity() const {
 bool UsbDriver::outputs_now(rig::Command& applied) noexcept {
   if (!board_.link) return false;
   Contents contents;
-  std::int64_t ignored = 0;
-  const IoResult read = fresh_frame(patient_ns, contents, ignored);
+  const IoResult read = fresh_frame(patient_ns, contents);
   if (!read.ok() && read.error != IoError::read_back_mismatch) return false;
   applied = command_shown(contents.drive[2], contents.brake[2], grid_.duty_steps);
   return options_.verify_outputs;
@@ -244,66 +222,6 @@ IoResult UsbDriver::do_make_safe() noexcept {
   if (result.ok() || result.error == IoError::disconnected) return with_reason(result);
   board_.link->recover();
   return with_reason(send_safe());
-}
-
-namespace {
-
-using rig::formatted;
-
-std::string text_of(std::string_view view) { return std::string(view); }
-
-}  // namespace
-
-std::vector<std::string> UsbDriver::notes() const {
-  if (!board_.link) return {};
-  std::vector<std::string> notes;
-  notes.push_back("USB board " + board_.place + ": opened and claimed");
-  notes.push_back(formatted("version word 0x%04x (%s), channel counts %04x %04x %04x", identity_[word::version],
-                            options_.version >= 0 ? "as configured" : "not compared: driver.usb.version is not set",
-                            identity_[word::channel_counts], identity_[word::channel_counts + 1],
-                            identity_[word::channel_counts + 2]));
-  const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
-  notes.push_back(formatted(
-      "PWM %d drive, %d brake, %s, prescaler %u: %.4g Hz if its clock is that of the PCI board; drive duty at "
-      "most %.3g, brake duty at most %.3g",
-      options_.drive_pwm, options_.brake_pwm, options_.pwm_mode.c_str(), prescaler, pwm_frequency_Hz(mode_, prescaler),
-      options_.motor_duty_max, options_.brake_duty_max));
-  notes.push_back(options_.verify_outputs
-                      ? "every frame must show the PWM words that were sent"
-                      : "the driver does not check the PWM words in the frames (driver.usb.verify_outputs=false): the "
-                        "safe state is sent and accepted, but not verified");
-  notes.push_back(
-      formatted("a cycle waits at most %d us for its frame; supply, temperature and interlocks are not known",
-                options_.answer_timeout_us));
-  notes.emplace_back(
-      "the board has no known watchdog: if this program dies or the cable is unplugged, the PWMs are assumed to hold "
-      "their duties: press the E-stop");
-  return notes;
-}
-
-std::vector<std::string> UsbDriver::tally() const {
-  return {formatted("USB board: %llu cycles without their frame", static_cast<unsigned long long>(frames_lost_))};
-}
-
-std::vector<std::string> UsbDriver::inspection() {
-  if (!board_.link) return {};
-  std::span<const std::uint8_t> bytes;
-  const IoResult result = fresh_answer(*board_.link, patient_ns, bytes);
-  if (!result.ok()) return {"no frame: " + error_text(result)};
-  std::vector<std::string> lines;
-  for (const WordGroup& group : words()) {
-    if (group.name == "-") continue;
-    std::string line = formatted("%3zu  %-21s", group.first, text_of(group.name).c_str());
-    constexpr std::size_t most_shown = 16;
-    for (std::size_t i = 0; i < group.count && i < most_shown; ++i) {
-      line += formatted("%04x ", word_at(bytes, group.first + i));
-    }
-    if (group.count > most_shown) line += "... ";
-    line += formatted(" %s, %s", text_of(name_of(group.standing)).c_str(), text_of(name_of(group.use)).c_str());
-    if (!group.open.empty()) line += "; not known: " + text_of(group.open);
-    lines.push_back(std::move(line));
-  }
-  return lines;
 }
 
 }  // namespace abs_hil::driver::usb

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_options.hpp"
 #include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/urb_link.hpp"
-#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -66,15 +66,16 @@ class UsbDriver final : public RigDriver {
   IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override;
 
-  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept;
+  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept {
+    return read_clock_ == nullptr ? otherwise : read_clock_();
+  }
   /// Requests a current frame and waits for it, at most `timeout_ns`. Drops a late frame first.
-  IoResult fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept;
+  IoResult fresh_frame(std::int64_t timeout_ns, Contents& contents) noexcept;
   IoResult lost_frame() noexcept;
   /// Adds the reason to a failure, and sends the safe frame without waiting. Only for frames that show other outputs
   /// than those sent it waits for one more frame, at most `answer_timeout_us`, to tell why.
   IoResult failed(const IoResult& result) noexcept;
   [[nodiscard]] IoResult checked(const Contents& contents) const noexcept;
-  void take_counts(const Contents& contents, std::array<std::int32_t, 2>& counts) const noexcept;
   void put_command(std::uint32_t drive_width, std::uint32_t brake_width, bool enable) noexcept;
   IoResult send_safe() noexcept;
   IoResult take_over(Contents& contents) noexcept;

@@ -2,10 +2,10 @@
 
 #include <utility>
 
+#include "driver/board_options.hpp"
 #include "driver/own_handle_writer.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/urb_link.hpp"
-#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -5,7 +5,7 @@
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/rig/parameters.hpp"
-#include "driver/board_rows.hpp"
+#include "driver/board_options.hpp"
 #include "experiment/options.hpp"
 #include "experiment/run_logic.hpp"
 #include "interchange/fmu/model.hpp"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "abs_hil/plant_sim/options.hpp"
-#include "driver/board_rows.hpp"
+#include "driver/board_options.hpp"
 #include "driver/sim/sim_driver.hpp"
 #include "experiment/options.hpp"
 #include "interchange/fmu/model.hpp"

@@ -14,8 +14,8 @@
 #include <string>
 
 #include "bench.hpp"
+#include "driver/board_options.hpp"
 #include "driver/factory.hpp"
-#include "driver/pci/pci_backend.hpp"
 
 namespace abs_hil::test {
 

@@ -100,7 +100,7 @@ TEST_CASE("Options that the board cannot have are refused, naming the key") {
   RegisterBoard board;
   Cable cable(board);
   CHECK_THROWS_WITH(Hm2Driver({.watchdog_ms = 4}, cable.opener()), Contains("driver.hm2.watchdog_ms"));
-  CHECK_THROWS_WITH(Hm2Driver({.drive_pwm = 1}, cable.opener()), Contains("different PWM instances"));
+  CHECK_THROWS_WITH(Hm2Driver({.drive_pwm = 1}, cable.opener()), Contains("different PWMs"));
   CHECK_THROWS_WITH(Hm2Driver({.answer_timeout_us = 900}, cable.opener()), Contains("at most 800 us"));
   for (const char* bad : {"", "board", "1.2.3", "1.2.3.4:", "1.2.3.4:0", "1.2.3.4:70000", "1.2.3.4:1x", "::1"}) {
     CHECK_THROWS_WITH(hm2::parse_address(bad), Contains("driver.hm2.address"));

@@ -1,9 +1,8 @@
-#include "driver/usb/usb_backend.hpp"
-
 #include <stdexcept>
 
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
+#include "driver/board_options.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;
