@@ -7,7 +7,6 @@
 #include <thread>
 #include <utility>
 
-#include "diagnosis/board_scan.hpp"
 #include "diagnosis/can_scan.hpp"
 #include "diagnosis/hm2_scan.hpp"
 #include "diagnosis/machine_facts.hpp"
@@ -115,6 +114,16 @@ Findings check_backend(const Examination& e) {
   return findings;
 }
 
+Finding judge_board(const driver::FoundBoard& board) {
+  Finding f{.check = "boards", .what = board.what, .detail = board.detail};
+  for (const driver::FoundBoard::Obstacle& obstacle : board.obstacles) {
+    f.standing = Standing::warning;
+    f.detail += (f.detail.empty() ? "" : "; ") + obstacle.what;
+    f.fix += (f.fix.empty() ? "" : "\n") + obstacle.fix;
+  }
+  return f;
+}
+
 Findings check_boards(const Examination& e) {
   Findings findings;
   for (const driver::Backend& backend : driver::registered_backends()) {
@@ -142,6 +151,19 @@ constexpr std::array<Check, 9> checks{{
 }};
 
 }  // namespace
+
+std::vector<Finding> judge(std::string_view kind, const std::vector<driver::FoundBoard>& boards) {
+  if (boards.empty()) {
+    return {{.check = "boards",
+             .what = "no board of driver.kind=" + std::string(kind) + " found",
+             .standing = Standing::note,
+             .detail = "searched by driver." + std::string(kind) + ".* (abs_hil list --keys)"}};
+  }
+  std::vector<Finding> findings;
+  findings.reserve(boards.size());
+  for (const driver::FoundBoard& board : boards) findings.push_back(judge_board(board));
+  return findings;
+}
 
 std::vector<std::string> check_names() {
   std::vector<std::string> names;

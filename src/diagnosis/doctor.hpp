@@ -12,6 +12,10 @@
 
 namespace abs_hil::diagnosis {
 
+/// Findings of the check "boards": each board that a backend has found, and what keeps a run from using it. A missing
+/// board is a note.
+[[nodiscard]] std::vector<Finding> judge(std::string_view kind, const std::vector<driver::FoundBoard>& boards);
+
 /// Names of the checks of `examine`, in its order.
 [[nodiscard]] std::vector<std::string> check_names();
 

@@ -1,9 +1,10 @@
 #include "diagnosis/machine_facts.hpp"
 
 #include <cstdlib>
+#include <fstream>
 #include <set>
 
-#include "diagnosis/text_file.hpp"
+#include "driver/sysfs.hpp"
 
 namespace abs_hil::diagnosis {
 
@@ -11,6 +12,13 @@ namespace {
 
 namespace fs = std::filesystem;
 const std::string unknown = "unknown";
+
+/// First line of a small file without trailing blanks; `otherwise` if it is empty or cannot be read.
+std::string first_line(const fs::path& file, const std::string& otherwise = {}) {
+  std::string line = driver::line_in(file);
+  line.erase(line.find_last_not_of(" \t\r\n") + 1);
+  return line.empty() ? otherwise : line;
+}
 
 /// "none voluntary (full)" -> "full": the kernel marks the active choice by parentheses.
 std::string chosen(const std::string& choices) {

@@ -51,7 +51,7 @@ GuardianSetup set_up() {
   constexpr double emulator_insist_s = 10.0;
   double& insist_s = setup.settings.guardian.insist_s;
   if (insist_s == 0.0 && !runtime::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
-  setup.writer = safe_state_writer_of(setup.settings.driver);
+  setup.writer = driver::make_safe_state_writer(setup.settings.driver);
   setup.writer->prepare();
   const runtime::RealtimeOptions realtime = realtime_options(setup.settings, setup.launch.realtime);
   setup.realtime = std::make_unique<runtime::RealtimeScope>(realtime);

@@ -37,26 +37,17 @@ void refuse_own_guardian_of_first_process(const driver::DriverOptions& driver) {
 }  // namespace
 
 std::string kept_board(const driver::DriverOptions& options) {
-  const auto boards = driver::registered_backends();
-  const auto entry = std::ranges::find(boards, options.kind, &driver::Backend::name);
-  const driver::BoardOptions* found = options.boards.find(options.kind);
-  if (entry == boards.end() || found == nullptr) return options.kind;
+  if (!driver::is_known(options.kind)) return options.kind;
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
   // The texts among the free options say where the board is.
   std::string text = options.kind;
-  driver::BoardOptions copy = *found;
+  driver::BoardOptions copy = chosen.options;
   copy.visit_options("", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    if (std::ranges::find(entry->free_options, std::string_view(name)) == entry->free_options.end()) return;
+    const auto& free = chosen.entry.free_options;
+    if (std::ranges::find(free, std::string_view(name)) == free.end()) return;
     if (const auto* const* place = std::get_if<std::string*>(&value)) text += ", " + name + " " + plain(**place);
   });
   return text;
-}
-
-std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options,
-                                                              bool beside_guardian) {
-  const driver::ChosenBackend chosen = driver::chosen_backend(options);
-  driver::RunFacts facts = options.facts();
-  facts.beside_guardian = beside_guardian;
-  return chosen.entry.make_safe_state_writer(chosen.options, facts);
 }
 
 bool needs_guardian(const config::Settings& settings, bool virtual_time) {

@@ -13,11 +13,6 @@ namespace abs_hil::guardian {
 /// text.
 [[nodiscard]] std::string kept_board(const driver::DriverOptions& options);
 
-/// The writer of that board's safe state. @param beside_guardian  it works although a guardian keeps the board. Throws
-/// driver::Unavailable for a kind without one.
-[[nodiscard]] std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options,
-                                                                            bool beside_guardian = false);
-
 /// Whether a run needs a guardian: only in real time on a board. In simulation and in virtual time nothing real moves.
 [[nodiscard]] bool needs_guardian(const config::Settings& settings, bool virtual_time);
 

@@ -15,6 +15,7 @@
 #include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/sysfs.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
@@ -41,12 +42,6 @@ int LinuxProcesses::open(pid_t pid) noexcept {
   return -1;
 }
 
-void LinuxProcesses::close(int handle) noexcept { ::close(handle); }
-
-bool LinuxProcesses::gone(int handle) noexcept { return has_ended(handle); }
-
-void LinuxProcesses::end(int handle) noexcept { static_cast<void>(send_signal(handle, SIGKILL)); }
-
 bool has_ended(int pidfd, int timeout_ms) noexcept {
   pollfd ended{pidfd, POLLIN, 0};
   int ready = 0;
@@ -69,9 +64,7 @@ bool send_signal(int pidfd, int signal) noexcept {
 }
 
 std::string name_of_process(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
-  std::string name;
-  std::getline(file, name);
+  const std::string name = driver::process_name(pid);
   return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + rig::printable(name, 64) + ")");
 }
 

@@ -2,7 +2,9 @@
 
 #include <sys/types.h>
 #include <sys/uio.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,15 +13,6 @@
 #include "guardian/board_guard.hpp"
 
 namespace abs_hil::guardian {
-
-/// Processes identified by pidfds. A pidfd never refers to another process, even when the process id is reused.
-class LinuxProcesses final : public Processes {
- public:
-  [[nodiscard]] int open(pid_t pid) noexcept override;
-  void close(int handle) noexcept override;
-  [[nodiscard]] bool gone(int handle) noexcept override;
-  void end(int handle) noexcept override;
-};
 
 /// Opens a pidfd of a process; -1 and errno on failure.
 [[nodiscard]] int open_pidfd(pid_t process) noexcept;
@@ -31,6 +24,15 @@ class LinuxProcesses final : public Processes {
 [[nodiscard]] bool has_ended(int pidfd, int timeout_ms = 0) noexcept;
 /// "process 17 (abs_hil)"
 [[nodiscard]] std::string name_of_process(pid_t pid);
+
+/// Processes identified by pidfds. A pidfd never refers to another process, even when the process id is reused.
+class LinuxProcesses final : public Processes {
+ public:
+  [[nodiscard]] int open(pid_t pid) noexcept override;
+  void close(int handle) noexcept override { ::close(handle); }
+  [[nodiscard]] bool gone(int handle) noexcept override { return has_ended(handle); }
+  void end(int handle) noexcept override { static_cast<void>(send_signal(handle, SIGKILL)); }
+};
 
 /// Sleeps until the guard wants to look, or there is an order, or the holder has ended. `orders` may be -1.
 void wait_for_guard(const BoardGuard& guard, int orders) noexcept;

@@ -54,14 +54,9 @@ void Mail::tell(const News& news, const Pages::Descriptors& pages) noexcept {
   static_cast<void>(send_packet(news_out_.get(), {&whole, 1}, {files.data(), pages.run < 0 ? 0 : files.size()}));
 }
 
-bool Mail::next(News& news, driver::FileDescriptor& run_page, driver::FileDescriptor& guard_page) {
+bool Mail::next(News& news, std::vector<driver::FileDescriptor>& pages) {
   iovec whole{&news, sizeof news};
-  std::vector<driver::FileDescriptor> files;
-  if (receive_packet(news_in_.get(), {&whole, 1}, files) != static_cast<ssize_t>(sizeof news)) return false;
-  if (files.size() != 2) return true;
-  run_page = std::move(files[0]);
-  guard_page = std::move(files[1]);
-  return true;
+  return receive_packet(news_in_.get(), {&whole, 1}, pages) == static_cast<ssize_t>(sizeof news);
 }
 
 std::string to_text(const GuardianReport& report, int controller) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/reason.hpp"
@@ -83,8 +84,9 @@ class Mail {
 
   /// Talker's end. False if the guard has not taken enough of the earlier orders: repeat it later.
   [[nodiscard]] bool order(const Order& order) noexcept;
-  /// The next piece of news, if there is one. `pages` gets the descriptors of `granted`.
-  [[nodiscard]] bool next(News& news, driver::FileDescriptor& run_page, driver::FileDescriptor& guard_page);
+  /// The next piece of news, if there is one. `pages` gets the descriptors of `granted`: the run's page, the
+  /// guard's.
+  [[nodiscard]] bool next(News& news, std::vector<driver::FileDescriptor>& pages);
   [[nodiscard]] int news_descriptor() const noexcept { return news_in_.get(); }
   [[nodiscard]] int order_end() const noexcept { return orders_out_.get(); }
 

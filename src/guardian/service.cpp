@@ -175,7 +175,7 @@ class Service {
 
   int run() {
     // The first thing: zeros. Nothing that can fail or wait stands before it but the configuration.
-    const auto board = safe_state_writer_of(settings_.driver);
+    const auto board = driver::make_safe_state_writer(settings_.driver);
     void* const memory =
         ::mmap(nullptr, sizeof(ServicePage), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
     if (memory == MAP_FAILED) throw driver::Unavailable(std::string("guardian: no memory: ") + std::strerror(errno));
@@ -297,7 +297,7 @@ class Service {
   }
 
   [[noreturn]] void stand_by(pid_t guard) {
-    const auto board = safe_state_writer_of(settings_.driver, true);
+    const auto board = driver::make_safe_state_writer(settings_.driver, true);
     try {
       if (board->works_beside_owner()) board->prepare();
     } catch (const std::exception&) {

@@ -69,8 +69,7 @@ void Talker::step(int timeout_ms) {
   }
   const std::int64_t now_ns = parts_.clock.now_ns();
   for (Client& client : clients_) {
-    const bool silent = !client.asks && !client.waits_for_safe && !(held_ && held_->socket == client.socket.get());
-    if (silent && now_ns - client.since_ns > speaks_within_ns) drop(client);
+    if (is_silent(client) && now_ns - client.since_ns > speaks_within_ns) drop(client);
   }
   std::erase_if(clients_, [](const Client& client) { return client.gone; });
   for (std::size_t n = 0; n < parts_.interruptions.size(); ++n) {
@@ -94,9 +93,7 @@ void Talker::accept_clients() {
     driver::FileDescriptor socket(::accept4(parts_.listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (socket.get() < 0) return;
     if (clients_.size() >= most_clients) {
-      const auto silent = std::ranges::find_if(clients_, [this](const Client& client) {
-        return !client.asks && !client.waits_for_safe && !(held_ && held_->socket == client.socket.get());
-      });
+      const auto silent = std::ranges::find_if(clients_, [this](const Client& client) { return is_silent(client); });
       if (silent == clients_.end()) return;
       clients_.erase(silent);
     }
@@ -111,7 +108,7 @@ Talker::Client* Talker::client_of(int socket) {
 }
 
 void Talker::drop(Client& client) {
-  if (held_ && held_->socket == client.socket.get()) close_holder();
+  if (holds(client)) close_holder();
   if (asking_ == client.socket.get()) asking_ = -1;
   client.gone = true;
 }
@@ -135,7 +132,7 @@ void Talker::hear(Client& client) {
     case LeaseWord::ask: return take_request(client, *said);
     default: break;
   }
-  if (held_ && held_->socket == client.socket.get() && said->word == LeaseWord::cover) return cover(client, *said);
+  if (holds(client) && said->word == LeaseWord::cover) return cover(client, *said);
   drop(client);
 }
 
@@ -193,7 +190,7 @@ std::string Talker::why_no_lease(const LeaseMessage& asked, const Peer& peer) co
 }
 
 void Talker::take_request(Client& client, LeaseMessage& asked) {
-  if (client.asks || (held_ && held_->socket == client.socket.get())) return drop(client);
+  if (client.asks || holds(client)) return drop(client);
   // One that has the lease and is still connected keeps it. Otherwise it is about to end.
   if (held_ && held_->socket >= 0) {
     return refuse(client, held_->name + " has the lease, and there is only one at a time; end that run first");
@@ -238,15 +235,11 @@ void Talker::cover(Client& client, const LeaseMessage& message) {
 
 void Talker::hear_guard() {
   News news;
-  driver::FileDescriptor run_page(-1);
-  driver::FileDescriptor guard_page(-1);
-  while (parts_.mail.next(news, run_page, guard_page)) {
-    take_news(news, std::exchange(run_page, driver::FileDescriptor(-1)),
-              std::exchange(guard_page, driver::FileDescriptor(-1)));
-  }
+  std::vector<driver::FileDescriptor> pages;
+  while (parts_.mail.next(news, pages)) take_news(news, std::exchange(pages, {}));
 }
 
-void Talker::take_news(const News& news, driver::FileDescriptor run_page, driver::FileDescriptor guard_page) {
+void Talker::take_news(const News& news, const std::vector<driver::FileDescriptor>& pages) {
   const driver::IoError before = std::exchange(latest_, news).board.error;
   if (!std::exchange(knows_board_, true) || before != news.board.error) tell_state();
   const bool of_held = held_ && held_->lease == news.lease;
@@ -261,7 +254,7 @@ void Talker::take_news(const News& news, driver::FileDescriptor run_page, driver
         if (i.dealt_with) i.dealt_with(news.safe);
       }
       break;
-    case NewsWord::granted: give_lease(news, run_page, guard_page); break;
+    case NewsWord::granted: give_lease(news, pages); break;
     case NewsWord::refused:
       if (holder != nullptr) {
         static_cast<void>(send_message(holder->socket.get(), {.word = LeaseWord::refused,
@@ -300,11 +293,11 @@ void Talker::tell_state() {
                                   : "NOT SAFE: " + driver::error_text(latest_.board) + "; tries on"));
 }
 
-void Talker::give_lease(const News& news, const driver::FileDescriptor& run_page,
-                        const driver::FileDescriptor& guard_page) {
+void Talker::give_lease(const News& news, const std::vector<driver::FileDescriptor>& pages) {
   Client* const client = client_of(std::exchange(asking_, -1));
   // The guard opened the process by its number. The client's own handle tells that it is still the same.
-  const bool lives = client != nullptr && parts_.identify(client->socket.get(), client->pidfd.get()).pid != 0;
+  const bool lives =
+      client != nullptr && pages.size() == 2 && parts_.identify(client->socket.get(), client->pidfd.get()).pid != 0;
   held_.emplace();
   held_->lease = news.lease;
   if (client != nullptr) {
@@ -312,7 +305,7 @@ void Talker::give_lease(const News& news, const driver::FileDescriptor& run_page
     held_->name = name_of_process(client->peer.pid);
     client->asks = false;
   }
-  if (!lives || !send_message(client->socket.get(), {.word = LeaseWord::granted}, {run_page.get(), guard_page.get()})) {
+  if (!lives || !send_message(client->socket.get(), {.word = LeaseWord::granted}, {pages[0].get(), pages[1].get()})) {
     return close_holder();
   }
   held_->socket = client->socket.get();

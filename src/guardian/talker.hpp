@@ -87,8 +87,12 @@ class Talker {
 
  private:
   using Client = TalkerClient;
-  using Held = HeldLease;
 
+  [[nodiscard]] bool holds(const Client& client) const { return held_ && held_->socket == client.socket.get(); }
+  /// It has not said yet what it wants, or has got its answer.
+  [[nodiscard]] bool is_silent(const Client& client) const {
+    return !client.asks && !client.waits_for_safe && !holds(client);
+  }
   void accept_clients();
   void hear(Client& client);
   void answer_state(const Client& client);
@@ -99,8 +103,8 @@ class Talker {
   void ask_guard_for_next();
   void cover(Client& client, const LeaseMessage& message);
   void hear_guard();
-  void take_news(const News& news, driver::FileDescriptor run_page, driver::FileDescriptor guard_page);
-  void give_lease(const News& news, const driver::FileDescriptor& run_page, const driver::FileDescriptor& guard_page);
+  void take_news(const News& news, const std::vector<driver::FileDescriptor>& pages);
+  void give_lease(const News& news, const std::vector<driver::FileDescriptor>& pages);
   void end_lease(const News& news);
   void answer_safe_callers(const std::string& what);
   void order(const Order& order);
@@ -115,7 +119,7 @@ class Talker {
   std::vector<Order> outbox_{};
   std::int64_t next_look_ns_{0};  ///< a flood of requests must not keep the guard at the board
   int asking_{-1};                ///< socket of the client for whom the guard was asked for a lease
-  std::optional<Held> held_{};
+  std::optional<HeldLease> held_{};
   News latest_{};
   bool knows_board_{false};
   bool interrupted_{false};

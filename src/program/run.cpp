@@ -110,7 +110,7 @@ runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time
 
 /// Checks in advance, as far as possible, that a guardian can start.
 void require_own_guardian(const driver::DriverOptions& board) {
-  static_cast<void>(guardian::safe_state_writer_of(board));
+  static_cast<void>(driver::make_safe_state_writer(board));
   const std::string program = guardian::guardian_program();
   if (::access(program.c_str(), X_OK) == 0) return;
   throw driver::Unavailable(

@@ -89,7 +89,7 @@ void ZeroWriting::write_zeros(const std::shared_ptr<State>& state, std::size_t b
     std::string problem;
     try {
       if (!writer) {
-        auto made = guardian::safe_state_writer_of(options, true);
+        auto made = driver::make_safe_state_writer(options, true);
         made->prepare();
         writer = std::move(made);
       }

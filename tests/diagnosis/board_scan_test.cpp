@@ -1,6 +1,5 @@
-#include "diagnosis/board_scan.hpp"
-
 #include "catch.hpp"
+#include "diagnosis/doctor.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::diagnosis;

@@ -36,11 +36,11 @@ struct Service {
   }
   void take_news() {
     News one;
-    driver::FileDescriptor run(-1);
-    driver::FileDescriptor page_of_guard(-1);
-    while (mail.next(one, run, page_of_guard)) {
+    std::vector<driver::FileDescriptor> files;
+    while (mail.next(one, files)) {
       news.push_back(one);
-      if (one.word == NewsWord::granted) pages.emplace(Pages::as_run({run.get(), page_of_guard.get()}));
+      if (one.word == NewsWord::granted) pages.emplace(Pages::as_run({files.at(0).get(), files.at(1).get()}));
+      files.clear();
     }
   }
   /// Answers to one order.
