@@ -7,9 +7,8 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart
-from . import discs, intervals, rate_limit, structure
+from . import choices, discs, intervals, structure
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
-from .forms import better_form
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
 from .linear import run_filter, step
 from .logs import Log, load_log
@@ -70,12 +69,12 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         try:
             begun.append(start_fit(problem, values, check, begun[0] if begun else None))
             # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
-            fits.append(rate_limit.started(begun[-1], check))
+            fits.append(choices.started(begun[-1], check))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
-    fit, decided = (fits[0], True) if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
+    fit, decided = (fits[0], True) if len(fits) == 1 else choices.better_form(fits, start_form, check, say, notes)
     try:
         finished = _likelier([fit, *(one for one in fits if one is not fit)], seed, say, check)
     except KeyboardInterrupt:
@@ -126,7 +125,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
         try:
             fit, first_causes, cost = _explained_first(fit, check, say)
             fit = disturbed_fit(fit, check, say)
-            limited = rate_limit.started(fit, check)
+            limited = choices.started(fit, check)
             fit = fit if limited is fit else disturbed_fit(limited, check, say)
             again, causes = structure.explained(fit, fit.disturbances, check, say)
             fit = fit if again is fit else disturbed_fit(again, check, say)
@@ -137,7 +136,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
                              ) from None
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
-    fit = rate_limit.settle(fit, QUIET if quiet else fit.disturbances, check)
+    fit = choices.settle(fit, QUIET if quiet else fit.disturbances, check)
     fit, round_discs = discs.settle(fit, QUIET if quiet else fit.disturbances, check)
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
@@ -166,7 +165,7 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
     """The fit with the flaws of the brake that it shows while small disturbances are allowed: those that the likelihood asks
     for would take the flaws up. With the causes that are left, and -2 log likelihood with the surest of them."""
     disturbances = ROUNDS[1][0]
-    near = rate_limit.without(fit)  # a limit that was found may stand for a flaw
+    near = choices.without(fit)  # a limit that was found may stand for a flaw
     for _ in range(3):
         step(near, disturbances, check)
     if search_u0(near, disturbances, 0.01, 9, check):
@@ -175,7 +174,7 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
         return fit, [], np.inf  # too far off to tell anything
     flawed, left = structure.explained(near, disturbances, check, say)
     if flawed is not near:
-        flawed, left = structure.explained(rate_limit.started(flawed, check), disturbances, check, say)
+        flawed, left = structure.explained(choices.started(flawed, check), disturbances, check, say)
     cost = run_filter(flawed, disturbances)[0] - (left[0].sure**2 if left else 0.0)
     return (fit if flawed is near else flawed), left, cost
 
@@ -183,13 +182,13 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
 def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps; None if it ends nowhere."""
     try:
-        fit = rate_limit.with_delay(finish_fit(fit, check), check, say)
+        fit = choices.with_delay(finish_fit(fit, check), check, say)
         if fit.rms_counts <= LARGEST_QUIET_RMS:
-            limited = rate_limit.sought(fit, QUIET, check)
+            limited = choices.sought(fit, QUIET, check)
         else:
             near = fit.copy()
             step(near, ROUNDS[-1][0], check)
-            limited = rate_limit.started(near, check)
+            limited = choices.started(near, check)
             limited = fit if limited is near else limited
         return fit if limited is fit else finish_fit(limited, check)
     except (ValueError, np.linalg.LinAlgError):

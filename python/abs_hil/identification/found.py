@@ -5,7 +5,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from . import discs, intervals, rate_limit, structure
+from . import choices, discs, intervals, structure
 from .logs import Log
 from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, FORMS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
@@ -212,7 +212,7 @@ def _no_rate_limit(fit: Fit, notes: list[str], cures: dict[str, list[str]]) -> E
     if not any(log.brake_pwm.any() for log in problem.logs):
         cures.setdefault(RATE_LIMIT.cure, []).append(RATE_LIMIT.key)
         return Estimate(0.0, None, None, 'not-identifiable', RATE_LIMIT.unit)
-    notes.append(f'the logs show no limit of the brake\'s rate; one above {rate_limit.fastest_Nm_s(fit, problem.logs):.3g} N m/s '
+    notes.append(f'the logs show no limit of the brake\'s rate; one above {choices.fastest_Nm_s(fit, problem.logs):.3g} N m/s '
                  'would not show')
     return Estimate(0.0, 0.0, RATE_LIMIT.most, 'bounded', RATE_LIMIT.unit)
 

@@ -14,8 +14,7 @@ import gymnasium
 import numpy as np
 
 from ..options import Value, program, text_of
-from .environment import action_space, check_options, observation_space
-from .picture import MODES, EpisodePicture
+from .environment import MODES, EpisodePicture, action_space, check_options, observation_space
 from .rigs import CHANGE_PRICE, END_SPEED_M_S, FAULT_REWARD, HIGH, LOW
 
 #: AgentPage of src/interchange/agent_controller.hpp

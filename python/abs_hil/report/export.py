@@ -24,15 +24,13 @@ class Exporter:
     def __init__(self, runs: list[RunFiles], columns: list[str]) -> None:
         self.runs = runs
         self.notes: list[str] = []
-        self._columns = columns or self._shared_columns()
+        if not columns:  # those that all runs share, in the order of the first run
+            names = [list(read_rows(run.csv).columns) for run in self.runs]
+            columns = [name for name in names[0] if all(name in other for other in names)]
+        self._columns = columns
 
     def write(self, kind: str, out: BinaryIO) -> None:
         {'csv': self._csv, 'json': self._json, 'octave': self._octave, 'parquet': self._parquet}[kind](out)
-
-    def _shared_columns(self) -> list[str]:
-        """Columns that all runs share, in the order of the first run."""
-        names = [list(read_rows(run.csv).columns) for run in self.runs]
-        return [name for name in names[0] if all(name in other for other in names)]
 
     def _tables(self) -> Iterator[tuple[RunFiles, dict[str, np.ndarray]]]:
         """Each run with its columns; phases as an array of names."""

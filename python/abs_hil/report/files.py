@@ -200,13 +200,6 @@ def _load_run(path: pathlib.Path) -> RunFiles:
         'radius and end speed'])
 
 
-def _load_series(path: pathlib.Path, found: FoundRuns) -> None:
-    folders, notes = runs_in_series(path)
-    found.notes += [clean(note) for note in notes]
-    found.series.append(SeriesFiles(_base_name(path), [len(found.runs) + number for number in range(len(folders))]))
-    found.runs += [_load_run(folder) for folder in folders]
-
-
 def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None = None) -> FoundRuns:
     """The runs that the command line names: CSV files, run folders, series folders. Raises ValueError."""
     found = FoundRuns()
@@ -217,7 +210,10 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None 
         if not path.is_dir() or (path / 'run.csv').exists():
             found.runs.append(_load_run(path))
         elif (path / 'series.json').exists() or any(path.glob('run-*/')):
-            _load_series(path, found)
+            folders, notes = runs_in_series(path)
+            found.notes += [clean(note) for note in notes]
+            found.series.append(SeriesFiles(_base_name(path), [len(found.runs) + number for number in range(len(folders))]))
+            found.runs += [_load_run(folder) for folder in folders]
         else:
             raise ValueError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '
                              'run-0001/)')

@@ -149,14 +149,10 @@ def _events_of(run: RunFiles, found: Survey) -> list[Event]:
     return events
 
 
-def _phase_text(event: Event) -> str:
-    """The experiment's own name of a phase with its kind, as `brake-low (brake)`; the kind alone if it has no other."""
-    return event.phase if event.name in ('', event.phase) else f'{event.name} ({event.phase})'
-
-
 def events_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, int]:
-    """The events of all runs, and how many more there are."""
-    rows = [[shown(event.time_s, 3), run.label, event.event, _phase_text(event), event.reason, event.value]
+    """The events of all runs, and how many more there are. A phase with a name of its own is "brake-low (brake)"."""
+    rows = [[shown(event.time_s, 3), run.label, event.event,
+             event.phase if event.name in ('', event.phase) else f'{event.name} ({event.phase})', event.reason, event.value]
             for run, found in zip(runs, surveys) for event in _events_of(run, found)]
     return (Table('events', ['time / s', 'run', 'event', 'phase', 'reason', 'value'], rows[:MOST_EVENTS], False),
             max(0, len(rows) - MOST_EVENTS))

@@ -6,18 +6,21 @@ import ipaddress
 import json
 import pathlib
 import socket
+import tempfile
 import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 from aiohttp import web
 
 from ..messages import PHASES, QUANTITIES
 from ..places import charts
-from .download import TYPES, make
+from ..run import csv_bytes, phase_names
 from .feed import Feed
-from .history import BIN_S, DERIVED
+from .history import BIN_S, COLUMNS, DERIVED, PLACE
+from .runs import RunFacts
 from .viewer import REASON_KINDS, Bad, Viewer, real, whole
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
@@ -27,6 +30,10 @@ POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; connect-src 
 HEADERS = {'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer',
            'Cache-Control': 'no-store', 'Cross-Origin-Resource-Policy': 'same-origin',
            'Cross-Origin-Opener-Policy': 'same-origin', 'X-Frame-Options': 'DENY'}
+#: of downloads
+DOWNLOADS = {'csv': 'text/csv', 'mcap': 'application/octet-stream'}
+_CSV = tuple(sorted((name for name in COLUMNS if QUANTITIES[name]['csv_column'] is not None),
+                    key=lambda name: int(QUANTITIES[name]['csv_column'])))
 KINDS = {'.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css'}
 MOST_CONNECTIONS, MOST_VIEWERS = 128, 64
 #: a connection that has not become a viewer by then is closed, so that idle ones cannot keep others out
@@ -153,8 +160,8 @@ class Server:
 
     async def _send_file(self, request: web.BaseRequest, kind: str) -> web.StreamResponse:
         """The cycles that the page shows, as a file."""
-        if kind not in TYPES:
-            return web.Response(status=404, text=f'abs_hil serve: give {" or ".join(TYPES)}\n', headers=HEADERS)
+        if kind not in DOWNLOADS:
+            return web.Response(status=404, text=f'abs_hil serve: give {" or ".join(DOWNLOADS)}\n', headers=HEADERS)
         if self._download.locked():
             return web.Response(status=503, text='abs_hil serve: another download is under way\n', headers=HEADERS)
         try:
@@ -170,12 +177,31 @@ class Server:
         self._door.stays(request.transport)
         async with self._download:
             try:
-                data = await asyncio.get_running_loop().run_in_executor(None, make, kind, run, rows)
+                data = await asyncio.get_running_loop().run_in_executor(None, file_of, kind, run, rows)
             except ImportError as error:
                 return web.Response(status=501, text=f'abs_hil serve: {error}; pip install mcap\n', headers=HEADERS)
         name = f'abs_hil-run-{run.number}-{time.strftime("%Y%m%d-%H%M%S", time.localtime(run.began))}.{kind}'
-        return web.Response(body=data, content_type=TYPES[kind],
+        return web.Response(body=data, content_type=DOWNLOADS[kind],
                             headers={**HEADERS, 'Content-Disposition': f'attachment; filename="{name}"'})
+
+
+def file_of(kind: str, run: RunFacts, rows: np.ndarray) -> bytes:
+    """The bytes of a file: CSV has the columns of --csv, bit-exactly, and the controller's own signals. Raises ImportError
+    without the package mcap."""
+    columns = {name: rows[:, PLACE[name]] for name in _CSV} | dict(zip(run.own, rows[:, len(COLUMNS):].T))
+    phase = columns['phase']
+    columns['phase'] = phase_names(np.where((phase >= 0) & (phase < len(PHASES)), phase, PHASES.index('fault')))
+    written = csv_bytes(columns)
+    if kind == 'csv':
+        return written
+    from ..interchange import recorded
+    with tempfile.TemporaryDirectory() as folder:
+        place = pathlib.Path(folder, f'run-{run.number}.csv')
+        place.write_bytes(written)
+        read = recorded.read(str(place))
+        read.events = [recorded.Event(event['time_s'], event['kind'], event['text']) for event in run.events]
+        recorded.to_mcap(read, str(place.with_suffix('.mcap')))
+        return place.with_suffix('.mcap').read_bytes()
 
 
 def is_loopback(host: str) -> bool:
