@@ -137,9 +137,9 @@ def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
 
 
-def phase_names(numbers: np.ndarray, names: tuple[str, ...] = PHASES) -> np.ndarray:
+def phase_names(numbers: np.ndarray) -> np.ndarray:
     """Names of phases from their numbers."""
-    return np.array(names, dtype=object)[numbers.astype(np.intp)]
+    return np.array(PHASES, dtype=object)[numbers.astype(np.intp)]
 
 
 def stretches(flags: np.ndarray) -> list[tuple[int, int]]:

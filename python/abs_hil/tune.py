@@ -1,5 +1,6 @@
 """abs_tune: searches for a controller's gains in simulation and writes them as a configuration file (docs/comparison.md)."""
 import argparse
+import inspect
 import math
 import pathlib
 import sys
@@ -185,18 +186,13 @@ def search(judge: Candidates, generations: int, seed: int,
         best[0] = min(best[0], float(found.min()))
         return found
 
+    # SciPy has renamed the argument of its random numbers.
+    named = 'rng' if 'rng' in inspect.signature(differential_evolution).parameters else 'seed'
+    random: dict[str, Any] = {named: np.random.default_rng(seed)}
     result = differential_evolution(cost, [(0.0, 1.0)] * dimensions, strategy='randtobest1bin', maxiter=generations,
                                     init=first, mutation=0.7, recombination=0.9, tol=0.0, atol=0.0, polish=False,
-                                    updating='deferred', vectorized=True, callback=callback,
-                                    **_generator(differential_evolution, seed))
+                                    updating='deferred', vectorized=True, callback=callback, **random)
     return Found(judge.values(result.x), float(result.fun), start_cost, judge.evaluations)
-
-
-def _generator(function: Callable[..., Any], seed: int) -> dict[str, Any]:
-    """SciPy has renamed the argument of its random numbers."""
-    import inspect
-    name = 'rng' if 'rng' in inspect.signature(function).parameters else 'seed'
-    return {name: np.random.default_rng(seed)}
 
 
 def to_toml(judge: Judge, found: Found, comment: str) -> str:

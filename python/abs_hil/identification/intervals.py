@@ -27,15 +27,14 @@ class Spread:
     of_logs: np.ndarray
 
 
-def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
-              check: Callable[[], None] = lambda: None) -> Spread:
+def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None) -> Spread:
     """Spread of the estimates over random encoder phases. The estimate is linear in the counts near the solution."""
     problem = fit.problem
     per_count = problem.radians_per_count
     random = np.random.default_rng(seed)
-    phases = random.uniform(size=(len(problem.logs), 2, replicates))
+    phases = random.uniform(size=(len(problem.logs), 2, REPLICATES))
     estimates = []
-    for begin in range(0, replicates, _BATCH):
+    for begin in range(0, REPLICATES, _BATCH):
         check()
         chosen = phases[:, :, begin:begin + _BATCH]
         size = len(fit.scale)

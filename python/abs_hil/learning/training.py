@@ -88,9 +88,9 @@ def train(task: Task, generations: int, seed: int, *, population: int = 40, plan
     return Policy(mean), curve
 
 
-def judge(task: Task, policy: Policy | None, law: str, plants: int, threads: int = 0) -> np.ndarray:
+def judge(task: Task, policy: Policy | None, law: str, plants: int) -> np.ndarray:
     """Returns of a policy, or of a controller of the program, on plants that training never saw; shape (plants,)."""
-    return returns(Rigs(plants, task, seed=JUDGING_SEED, law=law, threads=threads), policy, 0)
+    return returns(Rigs(plants, task, seed=JUDGING_SEED, law=law), policy, 0)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -6,7 +6,7 @@ import math
 import os
 import pathlib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -200,7 +200,7 @@ def _load_run(path: pathlib.Path) -> RunFiles:
         'radius and end speed'])
 
 
-def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None = None) -> FoundRuns:
+def find_runs(arguments: Iterable[str | pathlib.Path], labels: Sequence[str] = ()) -> FoundRuns:
     """The runs that the command line names: CSV files, run folders, series folders. Raises ValueError."""
     found = FoundRuns()
     for argument in arguments:
@@ -219,11 +219,11 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None 
                              'run-0001/)')
     for run, name in zip(found.runs, names_apart(run.name for run in found.runs)):
         run.name = name
-    _label(found.runs, labels or [])
+    _label(found.runs, labels)
     return found
 
 
-def _label(runs: list[RunFiles], labels: list[str]) -> None:
+def _label(runs: list[RunFiles], labels: Sequence[str]) -> None:
     if labels and len(labels) != len(runs):
         raise ValueError(f'{len(labels)} labels for {len(runs)} runs; give one --label for each run')
     differences = _what_differs(runs)

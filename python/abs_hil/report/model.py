@@ -118,9 +118,6 @@ class Figure:
     marks: list[Mark] = field(default_factory=list)
     paper: int = 0  # number of the paper's figure that it repeats; 0: none
 
-    def curves(self) -> list[Curve]:
-        return [curve for panel in self.panels for curve in panel.curves]
-
 
 def _step_for(span: float, wanted: int) -> float:
     rough = span / wanted

@@ -13,7 +13,7 @@ from .figures import Choice
 from .files import find_runs
 from .page import PAGE_MARK, Unavailable
 from .pictures import FORMATS as PICTURES
-from .report import Report, Request, make
+from .report import Report, make
 from .tables import Table, merits
 from .text import clean
 
@@ -120,13 +120,13 @@ def _print_rows(table: Table) -> None:
 
 def _report(o: argparse.Namespace) -> None:
     path = pathlib.Path(o.output or 'report.html')
-    request = Request(o.runs, o.labels, o.title, _choice(o.window), o.paper)
+    choice = _choice(o.window)
     if not o.table:
         _check_replaceable(path, o.force)
     if o.merits:
         refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
     with progress_shown(sys.stderr.isatty()) as progress:
-        made = make(request, progress)
+        made = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
         frame = merits(made.runs, made.surveys)
         write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))

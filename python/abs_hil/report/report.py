@@ -1,6 +1,6 @@
 """A report of runs: reads them once, makes figures, tables and the page."""
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from ..core import _core
@@ -16,15 +16,6 @@ from .timing import timing_figure
 
 
 @dataclass
-class Request:
-    runs: Sequence[Any]  # paths of run folders, CSV files, series folders
-    labels: list[str] = field(default_factory=list)
-    title: str = ''
-    choice: Choice = field(default_factory=Choice)
-    paper: bool = False
-
-
-@dataclass
 class Report:
     """figures: all of them, in the order of the page; parts: what the page shows, by the names of its template."""
     runs: list[RunFiles]
@@ -36,11 +27,9 @@ class Report:
         return page(**self.parts)
 
 
-def _title(request: Request, found: FoundRuns) -> str:
+def _title(found: FoundRuns, of_paper: bool) -> str:
     runs = found.runs
-    if request.title:
-        return clean(request.title)
-    if request.paper:
+    if of_paper:
         return 'The paper’s comparison: figures 5 to 10'
     if found.series:
         return f'Series {found.series[0].name}'
@@ -68,14 +57,16 @@ def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
             options.groups[run] = number
 
 
-def make(request: Request, progress: Callable[[int, int], None] | None = None) -> Report:
-    """Reads the runs and makes the report. Raises ValueError for what cannot be used."""
-    found = find_runs(request.runs, request.labels)
+def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice, of_paper: bool,
+         progress: Callable[[int, int], None] | None = None) -> Report:
+    """Reads the runs (run folders, CSV files, series folders) and makes the report. Raises ValueError for what cannot be
+    used."""
+    found = find_runs(paths, labels)
     runs = found.runs
-    if request.paper:
+    if of_paper:
         paper.order_for_paper(runs, found.notes)
     studies = [study(series, runs) for series in found.series]
-    options = Options(request.choice, request.paper)
+    options = Options(choice, of_paper)
     _groups(studies, len(runs), options)
     surveys, figures = run_figures(runs, options, progress)
     series: list[dict[str, Any]] = [
@@ -84,12 +75,13 @@ def make(request: Request, progress: Callable[[int, int], None] | None = None) -
     timing = timing_figure(runs)
     metrics, shared = tables.metrics_table(runs, surveys)
     events, left_out = tables.events_table(runs, surveys)
-    pairs = paper.pairs_of(runs, surveys) if request.paper else {}
-    parts = {'figures': figures, 'series': series, 'timing_figure': timing, 'runs': len(runs), 'title': _title(request, found),
-             'version': _core.version, 'lead': paper.lead(runs) if request.paper else _lead(runs),
-             'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if request.paper else None,
+    pairs = paper.pairs_of(runs, surveys) if of_paper else {}
+    parts = {'title': clean(title) or _title(found, of_paper), 'version': _core.version,
+             'lead': paper.lead(runs) if of_paper else _lead(runs), 'runs': len(runs), 'figures': figures, 'series': series,
+             'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if of_paper else None,
              'metrics': metrics, 'shared': shared, 'phases': tables.phases_table(runs, surveys), 'events': events,
              'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
-             'environment': tables.environment_table(runs), 'notes': tables.all_notes(runs, surveys, found.notes)}
+             'timing_figure': timing, 'environment': tables.environment_table(runs),
+             'notes': tables.all_notes(runs, surveys, found.notes)}
     every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
     return Report(runs, surveys, every, parts)

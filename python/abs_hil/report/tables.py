@@ -31,9 +31,6 @@ class Table:
         lines = [list(line) for line in zip(*[self.header, *self.rows])]
         return Table(self.id, lines[0], lines[1:], self.numbers)
 
-    def __bool__(self) -> bool:
-        return bool(self.rows)
-
 
 def _change(first: float, second: float) -> str:
     """Change from the first to the second run, in per cent; a large change as a factor."""

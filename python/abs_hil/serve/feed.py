@@ -13,7 +13,7 @@ import numpy as np
 from ..core import load_network
 from ..messages import MOST_SIGNALS, PHASES, QUANTITIES, decode
 from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
-from .runs import MOST_RUNS, MOST_TEXT, RunFacts
+from .runs import MESSAGES, MOST_RUNS, MOST_TEXT, RunFacts
 
 Packet = tuple[str, bytes]
 #: a listener gets the run and its new rows, of shape (cycles, WIDTH)
@@ -78,15 +78,13 @@ class Feed:
         if kind == 'telemetry_t':
             self._cycle(message)
             return
-        handler = {'event_t': 'take_event', 'experiment_t': 'take_experiment', 'status_t': 'take_status',
-                   'command_state_t': 'take_commands'}.get(kind)
-        if handler is None:
+        if kind not in MESSAGES:
             return
         self._flush()
         if kind == 'experiment_t' or self._run is None:
-            self._early[handler] = message
+            self._early[kind] = message
         else:
-            getattr(self._run, handler)(message)
+            self._run.take(message)
 
     def _cycle(self, message: Any) -> None:
         cycle, names = message.cycle, message.names
@@ -104,8 +102,8 @@ class Feed:
             if self._run is not None:
                 self._run.own = tuple(name for name in names.split(',') if name and name not in PLACE)[:MOST_SIGNALS]
         if self._early and self._run is not None:
-            for handler, early in self._early.items():
-                getattr(self._run, handler)(early)
+            for early in self._early.values():
+                self._run.take(early)
             self._early.clear()
         self._last_cycle = cycle
         values = dict(zip(names.split(','), message.values))

@@ -11,6 +11,8 @@ from .history import PLACE
 MOST_MARKS, MOST_EVENTS, MOST_RUNS = 200, 200, 20
 #: characters of a text from the network
 MOST_TEXT = 300
+#: what RunFacts takes beside the cycles
+MESSAGES = ('event_t', 'experiment_t', 'status_t', 'command_state_t')
 #: bounds of the histograms' classes: ten a decade from 1 us to 100 ms; below and above are classes too
 EDGES_NS = 1e3 * 10.0 ** (np.arange(51) / 10.0)
 TIMED = ('wakeup_latency_ns', 'cycle_ns')
@@ -69,8 +71,20 @@ class RunFacts:
                 **{key: known[key] for key in ('kind', 'text', 'quantity', 'unit', 'bound')}, 'count': 0, 'first_s': time_s})
             verdict.update(count=verdict['count'] + 1, last_s=time_s, value=number(float(row[PLACE['reason_value']])))
 
-    def take_event(self, event: Any) -> None:
+    def take(self, message: Any) -> None:
+        """One of MESSAGES."""
         self.version += 1
+        kind = type(message).__name__
+        if kind == 'event_t':
+            self._take_event(message)
+        elif kind == 'experiment_t':
+            self._take_experiment(message)
+        elif kind == 'status_t':
+            self.status = {name: number(getattr(message, name)) for name in message.__slots__}
+        else:
+            self.commands = {'enabled': bool(message.enabled), 'waiting': bool(message.waiting)}
+
+    def _take_event(self, event: Any) -> None:
         known = REASONS.get(event.reason, {})
         self.events.append({'time_s': number(event.time_s) or 0.0, 'kind': event.kind[:MOST_TEXT],
                             'text': (event.message or event.reason_text)[:MOST_TEXT],
@@ -78,8 +92,7 @@ class RunFacts:
                             **{key: known.get(key, '') for key in ('quantity', 'unit', 'bound')}})
         del self.events[:-MOST_EVENTS]
 
-    def take_experiment(self, message: Any) -> None:
-        self.version += 1
+    def _take_experiment(self, message: Any) -> None:
         self.names = {name: str(getattr(message, name))[:MOST_TEXT]
                       for name in ('experiment', 'controller', 'plant', 'backend', 'version')}
         try:
@@ -89,14 +102,6 @@ class RunFacts:
         # Of the configuration, feed.py wants these two.
         self.config = {part: config[part] for part in ('plant', 'model')
                        if isinstance(config, dict) and isinstance(config.get(part), dict)}
-
-    def take_status(self, message: Any) -> None:
-        self.version += 1
-        self.status = {name: number(getattr(message, name)) for name in message.__slots__}
-
-    def take_commands(self, message: Any) -> None:
-        self.version += 1
-        self.commands = {'enabled': bool(message.enabled), 'waiting': bool(message.waiting)}
 
     def told(self) -> dict[str, Any]:
         """What a viewer gets, ready for JSON."""

@@ -43,12 +43,6 @@ SEND_BUFFER_BYTES = 1 << 17
 Command = Callable[[str, str, float], Awaitable[tuple[bool, str]]]
 
 
-def page_files() -> dict[str, pathlib.Path]:
-    """Name -> file."""
-    found = [*(_FOLDER / 'page').iterdir(), *charts().iterdir()]
-    return {path.name: path for path in found if path.suffix in KINDS}
-
-
 class Door(web.Server):
     """Counts connections. One too many is closed at once; so is one that does not decide what it wants."""
 
@@ -83,7 +77,8 @@ class Server:
         self._command = command
         self._viewers: set[Viewer] = set()
         self._download = asyncio.Lock()
-        self._files = {name: path.read_bytes() for name, path in page_files().items()}
+        self._files = {path.name: path.read_bytes() for path in (*(_FOLDER / 'page').iterdir(), *charts().iterdir())
+                       if path.suffix in KINDS}
         self._door = Door(self._answer)
         self._runner = web.ServerRunner(self._door, handle_signals=False)
         self._hello = {'kind': 'hello', 'source': source, 'bin_s': BIN_S, 'phases': PHASES, 'reason_kinds': REASON_KINDS,

@@ -47,14 +47,10 @@ class Trigger:
             if self._edge not in ('rise', 'fall', 'either'):
                 raise Bad(f'edge "{self._edge}": give rise, fall or either')
         elif self._kind == 'phase':
-            name = text(asked, 'phase')
-            if name and name not in PHASES:
-                raise Bad(f'phase "{name}": give one of {" ".join(PHASES)}, or "" for any')
+            name = _one_of(asked, 'phase', PHASES)
             self._signal, self._wanted = 'phase_index', PHASES.index(name) if name else None
         elif self._kind == 'event':
-            name = text(asked, 'event')
-            if name and name not in REASON_KINDS:
-                raise Bad(f'event "{name}": give one of {", ".join(REASON_KINDS)}, or "" for any')
+            name = _one_of(asked, 'event', REASON_KINDS)
             self._signal = 'reason'
             self._reasons = [number for number, row in REASONS.items() if number and name in ('', row['kind'])]
         else:
@@ -281,6 +277,13 @@ def _given(asked: dict[str, Any], name: str, kind: Any, valid: Callable[[Any], b
 
 def text(asked: dict[str, Any], name: str) -> str:
     return _given(asked, name, str, lambda value: len(value) <= 200, 'a text')
+
+
+def _one_of(asked: dict[str, Any], name: str, known: tuple[str, ...]) -> str:
+    value = text(asked, name)
+    if value and value not in known:
+        raise Bad(f'{name} "{value}": give one of {", ".join(known)}, or "" for any')
+    return value
 
 
 def real(asked: dict[str, Any], name: str) -> float:
