@@ -44,8 +44,8 @@ class Page(ReportTest):
         self.assertEqual([kind for kind, _ in read.scripts], ['application/gzip', 'application/gzip', ''])
         hashes = [base64.b64encode(hashlib.sha256(data).digest()).decode()
                   for data in (unpacked(read.scripts[1][1]), read.scripts[2][1].encode())]
-        self.assertEqual(read.policy, "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; script-src "
-                         + ' '.join(f"'sha256-{value}'" for value in hashes))
+        self.assertEqual(read.policy, "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
+                         "form-action 'none'; script-src " + ' '.join(f"'sha256-{value}'" for value in hashes))
         for tag in ('link', 'img', 'iframe', 'object', 'base', 'form'):
             self.assertNotIn(tag, read.elements)
 

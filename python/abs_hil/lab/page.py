@@ -12,8 +12,7 @@ from typing import Any
 from ..core import _core
 from ..files import write_text
 from ..places import CHARTS_SCRIPT, CHARTS_STYLE, charts
-from ..report.page import Unavailable, _hash
-from ..report.plots import compressed
+from ..report.page import Unavailable, standalone
 from .exercise import find, known, read
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
@@ -38,25 +37,13 @@ def _text(name: str) -> str:
 
 
 def page(exercise: dict[str, Any] | None) -> str:
-    import jinja2
-    from markupsafe import Markup
-    wasm = module()
-    drawer = (charts() / CHARTS_SCRIPT).read_text(encoding='utf-8')
+    data = {'module': module(), 'page': json.dumps({'exercise': exercise}).encode()}
     own = "'use strict';\n(() => {\n" + ''.join(_text(name) for name in _SCRIPTS) + '})();\n'
-    # No script but these two runs, and nothing is fetched.
-    policy = ("default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; "
-              f"script-src {_hash(drawer)} {_hash(own)} 'wasm-unsafe-eval'")
-    data = json.dumps({'exercise': exercise})
-    scripts = Markup(f'<script type="application/gzip" id="module">{compressed(wasm)}</script>\n'
-                     f'<script type="application/gzip" id="page">{compressed(data.encode())}</script>\n'
-                     f'<script>{drawer}</script>\n<script>{own}</script>')
     css = ((charts() / CHARTS_STYLE).read_text(encoding='utf-8')
            + (_FOLDER.parent / 'serve' / 'page' / 'serve.css').read_text(encoding='utf-8') + _text('lab.css'))
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
-                                     loader=jinja2.FileSystemLoader(_FOLDER / 'page'))
-    return environment.get_template('lab.html.j2').render(
-        title=exercise['title'] if exercise else 'The ABS lab', exercise=exercise, version=_core.version, policy=policy,
-        css=Markup(css), scripts=scripts) + '\n'
+    return standalone('lab.html.j2', [_FOLDER / 'page'], data, [(charts() / CHARTS_SCRIPT).read_text(encoding='utf-8'), own], css,
+                      more=" 'wasm-unsafe-eval'", title=exercise['title'] if exercise else 'The ABS lab', exercise=exercise,
+                      version=_core.version)
 
 
 def _parser() -> argparse.ArgumentParser:

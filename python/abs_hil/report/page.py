@@ -1,14 +1,16 @@
 """A report as one HTML page that needs no network: tables, plotly.js, and the curves as data."""
 import base64
+import gzip
 import hashlib
 import importlib.util
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from .model import Figure
-from .plots import compressed, packed, plot
+from .plots import packed, plot
 from .text import significant
 
 _FOLDER = pathlib.Path(__file__).parent
@@ -36,27 +38,32 @@ def plotly_js() -> str:
                       'scripts/setup_python.sh python-packages.txt in the source folder')
 
 
-def _hash(script: str) -> str:
-    return "'sha256-" + base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode() + "'"
-
-
-def render(template: str, drawn: list[Figure] | list[dict[str, Any]], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
-    """A page from a template of `folder`, with these figures as data and the policy that only its own scripts run."""
+def standalone(template: str, folders: list[pathlib.Path], data: dict[str, bytes], scripts: list[str], css: str, *,
+               started: Sequence[str] = (), more: str = '', **context: Any) -> str:
+    """A page that fetches nothing. data: by the id under which the page's scripts find it; scripts: those that run, and
+    `started` those that they start; no other does, so a run's files cannot inject active content."""
     import jinja2
     from markupsafe import Markup
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
-                                     loader=jinja2.FileSystemLoader([folder, _FOLDER]))
+                                     loader=jinja2.FileSystemLoader(folders))
+    hashes = ' '.join("'sha256-" + base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode() + "'"
+                      for script in (*started, *scripts))
+    policy = ("default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; "
+              f'script-src {hashes}{more}')
+    packs = {name: base64.b64encode(gzip.compress(content, 9, mtime=0)).decode() for name, content in data.items()}
+    parts = [f'<script type="application/gzip" id="{name}">{pack}</script>' for name, pack in packs.items()]
+    parts += [f'<script>{script}</script>' for script in scripts]
+    return environment.get_template(template).render(**context, policy=policy, css=Markup(css),
+                                                     scripts=Markup('\n'.join(parts))) + '\n'
+
+
+def render(template: str, drawn: list[Figure] | list[dict[str, Any]], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
+    """A page from a template of `folder`, with these figures as data."""
     plotly = plotly_js()
-    js = (_FOLDER / 'page.js').read_text(encoding='utf-8')
     plots = [figure if isinstance(figure, dict) else plot(figure) for figure in drawn]
-    # No script but these two runs, and nothing is fetched: a run's files cannot inject active content.
-    policy = (f"default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; "
-              f'script-src {_hash(plotly)} {_hash(js)}')
-    return environment.get_template(template).render(
-        **context, policy=policy, scripts=Markup(
-            f'<script type="application/gzip" id="plots">{packed(plots)}</script>\n'
-            f'<script type="application/gzip" id="plotly">{compressed(plotly.encode())}</script>\n<script>{js}</script>'),
-        css=(_FOLDER / 'page.css').read_text(encoding='utf-8')) + '\n'
+    return standalone(template, [folder, _FOLDER], {'plots': packed(plots), 'plotly': plotly.encode()},
+                      [(_FOLDER / 'page.js').read_text(encoding='utf-8')], (_FOLDER / 'page.css').read_text(encoding='utf-8'),
+                      started=[plotly], **context)
 
 
 def _alternative(figure: Figure) -> str:

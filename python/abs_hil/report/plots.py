@@ -1,6 +1,4 @@
 """Figures as data for plotly.js: one dictionary a figure, which page.js draws."""
-import base64
-import gzip
 import html
 import json
 import math
@@ -33,12 +31,7 @@ def numbers(values: np.ndarray, kind: str = 'f8') -> np.ndarray:
     return np.ascontiguousarray(values, dtype='<' + kind)
 
 
-def compressed(data: bytes) -> str:
-    """Base64 of gzip, as text of a page; the same bytes give the same text."""
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
-
-
-def packed(plots: list[dict[str, Any]]) -> str:
+def packed(plots: list[dict[str, Any]]) -> bytes:
     """All plots, for page.js: the length of a JSON text (4 bytes), the text, and behind it the numbers, each array once."""
     floats = bytearray()
     known: dict[tuple[str, bytes], int] = {}
@@ -53,7 +46,7 @@ def packed(plots: list[dict[str, Any]]) -> str:
 
     text = json.dumps({'plots': plots, 'dark': DARK}, ensure_ascii=False, allow_nan=False, separators=(',', ':'),
                       default=reference).encode()
-    return compressed(len(text).to_bytes(4, 'little') + text + bytes(floats))
+    return len(text).to_bytes(4, 'little') + text + bytes(floats)
 
 
 def _line(style: Style) -> dict[str, Any]:
