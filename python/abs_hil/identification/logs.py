@@ -1,5 +1,4 @@
 """Logs for identification: what was measured and what was sent, from run folders, event logs and plain CSV files."""
-import dataclasses
 import gzip
 import hashlib
 import io
@@ -69,7 +68,9 @@ def load_log(path: PathLike | Run) -> Log:
     Raises ValueError for a file that cannot serve, with its name and the reason; what is cut off is left out and noted.
     """
     if isinstance(path, Run):
-        return _of_run(path)
+        experiment = str(path.summary.get('experiment') or '')
+        content = b''.join(np.ascontiguousarray(path.columns[name]).tobytes() for name in NEEDED if name in path.columns)
+        return _log(pathlib.Path(path.folder or experiment or 'run'), path.columns, list(path.notes), content, experiment)
     place = pathlib.Path(path)
     if place.is_dir() or place.suffix == '.lcmlog':
         columns, notes, content, experiment = _from_run(place)
@@ -77,26 +78,14 @@ def load_log(path: PathLike | Run) -> Log:
         columns, notes, content = _from_csv(place)
         experiment = ''
     try:
-        return dataclasses.replace(_log(place, columns, notes, hashlib.sha256(content).hexdigest()), experiment=experiment)
+        return _log(place, columns, notes, content, experiment)
     except ValueError as error:
         raise ValueError(f'"{place}": {error}') from None
 
 
-def _of_run(run: Run) -> Log:
-    experiment = str(run.summary.get('experiment') or '')
-    content = b''.join(np.ascontiguousarray(run.columns[name]).tobytes() for name in NEEDED if name in run.columns)
-    log = _log(pathlib.Path(run.folder or experiment or 'run'), run.columns, list(run.notes), hashlib.sha256(content).hexdigest())
-    return dataclasses.replace(log, experiment=experiment)
-
-
 def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
     run = load(place)
-    content = b''
-    for name in ('run.csv', 'run.lcmlog'):
-        file = place if place.is_file() else place / name
-        if file.exists():
-            content = file.read_bytes()
-            break
+    content = next(file for file in (place, place / 'run.csv', place / 'run.lcmlog') if file.is_file()).read_bytes()
     columns = run.columns
     if 'upper_counts' not in columns and (place / 'run.lcmlog').exists():
         columns = load(place / 'run.lcmlog').columns
@@ -143,7 +132,7 @@ def _unzipped(content: bytes) -> tuple[bytes, bool]:
     return b''.join(parts), False
 
 
-def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], sha256: str) -> Log:
+def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], content: bytes, experiment: str) -> Log:
     missing = [name for name in NEEDED if name not in columns]
     if missing:
         raise ValueError(f'the log lacks the columns {", ".join(missing)}; needed are {", ".join(NEEDED)}')
@@ -184,8 +173,8 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
             raise ValueError(f'{name} never changes: the wheel stood, or its encoder is not connected')
     phase = np.asarray(columns.get('phase_name', columns.get('phase', np.full(len(time_s), ''))), dtype=object)
     name = place.resolve().name.removesuffix('.gz').removesuffix('.csv').removesuffix('.lcmlog')
-    return Log(name, place, sha256, time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
-               (apart != 0).astype(float), phase, late, notes, first_counts)
+    return Log(name, place, hashlib.sha256(content).hexdigest(), time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
+               (apart != 0).astype(float), phase, late, notes, first_counts, experiment)
 
 
 def _unwrapped(counts: np.ndarray) -> np.ndarray:
