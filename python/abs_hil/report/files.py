@@ -52,7 +52,6 @@ class RunFiles:
     """All files of a run but its rows. All but the CSV may be missing; `notes` say what is missing."""
     csv: pathlib.Path
     name: str
-    folder: pathlib.Path | None = None
     label: str = ''    # in legends and table heads: the given one, else in what it differs from the others
     called: str = ''   # in notes and files: the given label, else the name
     summary: dict[str, Any] = field(default_factory=dict)
@@ -192,7 +191,7 @@ def _base_name(path: pathlib.Path) -> str:
 def _load_run(path: pathlib.Path) -> RunFiles:
     if path.is_dir():
         _core.check_seal(os.fsencode(path))
-        run = RunFiles(path / 'run.csv', _base_name(path), path)
+        run = RunFiles(path / 'run.csv', _base_name(path))
         _read_folder(run, path)
         return run
     return RunFiles(path, _base_name(path), notes=[
@@ -212,7 +211,7 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: Sequence[str] = (
         elif (path / 'series.json').exists() or any(path.glob('run-*/')):
             folders, notes = runs_in_series(path)
             found.notes += [clean(note) for note in notes]
-            found.series.append(SeriesFiles(_base_name(path), [len(found.runs) + number for number in range(len(folders))]))
+            found.series.append(SeriesFiles(_base_name(path), [*range(len(found.runs), len(found.runs) + len(folders))]))
             found.runs += [_load_run(folder) for folder in folders]
         else:
             raise ValueError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '

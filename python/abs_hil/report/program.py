@@ -189,5 +189,3 @@ def main(arguments: list[str]) -> int:
         print(f'abs_report: {clean(error, 4000)}', file=sys.stderr)
         return BAD_INPUT
     return 0
-
-

@@ -46,8 +46,7 @@ def quantile_table(results: StudyResults) -> Table:
 def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[str]]:
     """First-order and total index of each factor, for each metric and controller; and what could not be computed."""
     rows, notes = [], []
-    names = ['plant', 'experiment', 'controller', *results.levels]
-    by = [name for name, different in results.columns(names).nunique().items() if different > 1]
+    by = results.groups
     for metric in metrics:
         for name, part in groups_of(results.columns(by), by):
             where = {key: part[key].iloc[0] for key in by}
