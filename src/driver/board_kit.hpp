@@ -9,7 +9,9 @@
 #include <string>
 #include <string_view>
 
+#include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/duty_grid.hpp"
 #include "abs_hil/rig/option_check.hpp"
@@ -120,6 +122,26 @@ template <class Options>
   const double us = options.answer_timeout_us > 0 ? options.answer_timeout_us : share * period_us;
   return static_cast<std::int64_t>(us * static_cast<double>(rig::ns_per_us));
 }
+
+/// What the drivers of all boards have: the steps and caps of their outputs, and a clock.
+class BoardDriver : public RigDriver {
+ public:
+  using ReadClock = std::int64_t (*)() noexcept;
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept final {
+    return grid_.as_sent(command);
+  }
+
+ protected:
+  /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
+  explicit BoardDriver(const OutputGrid& grid, ReadClock read_clock = nullptr) noexcept
+      : grid_(grid), read_clock_(read_clock) {}
+  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept {
+    return read_clock_ == nullptr ? otherwise : read_clock_();
+  }
+
+  OutputGrid grid_;
+  ReadClock read_clock_;
+};
 
 /// The clock of an emulated board in lock-step: it advances only when the driver says so. No hardware has such a clock.
 class EmulatedTime {

@@ -28,8 +28,8 @@ std::int64_t answer_timeout_of(const CanOptions& options, bool lock_step) {
 }  // namespace
 
 CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step)
-    : options_(options),
-      grid_(output_grid(options)),
+    : BoardDriver(output_grid(options)),
+      options_(options),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
       answer_timeout_ns_(answer_timeout_of(options, lock_step)),

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/can/answer_tracker.hpp"
 #include "driver/can/bus.hpp"
@@ -50,7 +50,7 @@ struct CanCounters {
 /// ABS_COMMAND and does not wait. The driver tolerates single losses: it returns the previous measurement again, with
 /// its time stamp. Sustained loss, and every state of the bus in which the node cannot be reached, fails `read` or
 /// `write` with its own reason. Without commands the node's watchdog zeroes the outputs.
-class CanDriver final : public RigDriver {
+class CanDriver final : public BoardDriver {
  public:
   using OpenLink = std::function<Link()>;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
@@ -60,9 +60,6 @@ class CanDriver final : public RigDriver {
   ~CanDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
-  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
-    return grid_.as_sent(command);
-  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
@@ -119,7 +116,6 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] Frame in_format(Frame frame) const noexcept;
 
   CanOptions options_;
-  OutputGrid grid_;
   OpenLink open_link_;
   bool lock_step_;
   std::int64_t answer_timeout_ns_;

@@ -55,10 +55,9 @@ Packet safe_packet(const Board& board, const RegisterPair& pwm) noexcept {
 }
 
 Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step)
-    : options_(options),
-      grid_(output_grid(options)),
+    : BoardDriver(output_grid(options), lock_step ? nullptr : read_clock),
+      options_(options),
       open_link_(std::move(open_link)),
-      read_clock_(lock_step ? nullptr : read_clock),
       lock_step_(lock_step),
       answer_timeout_ns_(answer_timeout_ns("driver.hm2.", options, answer_share)) {
   check_options("driver.hm2.", options);

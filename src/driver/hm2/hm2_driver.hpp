@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "abs_hil/driver/backend.hpp"
-#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/hm2/board.hpp"
 #include "driver/loss_bucket.hpp"
@@ -43,9 +43,8 @@ inline constexpr std::int64_t hm2_make_safe_bound_ns = safe_tries * safe_answer_
 /// The board ends its outputs `watchdog_ms` after the last write. Before the first write of an activation, and after
 /// `rest`, this is no fault; the first write then sets the outputs up again, with duties 0. Afterwards nothing but a
 /// new activation does.
-class Hm2Driver final : public RigDriver {
+class Hm2Driver final : public BoardDriver {
  public:
-  using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link   called by `configure`; throws Unavailable
   /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
@@ -54,9 +53,6 @@ class Hm2Driver final : public RigDriver {
   ~Hm2Driver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "hm2"; }
-  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
-    return grid_.as_sent(command);
-  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::optional<AnswerTimes> answer_times() const override;
@@ -118,14 +114,9 @@ class Hm2Driver final : public RigDriver {
   IoResult latch(const IoResult& fault) noexcept;
   void send_safe() noexcept;
   void tell_time(std::int64_t time_ns) noexcept;
-  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept {
-    return read_clock_ == nullptr ? otherwise : read_clock_();
-  }
 
   Hm2Options options_;
-  OutputGrid grid_;
   OpenLink open_link_;
-  ReadClock read_clock_;
   bool lock_step_;
   std::int64_t answer_timeout_ns_;
   double stamp_tick_ns_{0.0};

@@ -52,11 +52,10 @@ class PciDriver::Access {
 };
 
 PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
-    : options_(options),
+    : BoardDriver(pwm_grid(options), read_clock),
+      options_(options),
       mode_(pwm_mode_named(options.pwm_mode)),
-      grid_(pwm_grid(options)),
-      open_card_(std::move(open_card)),
-      read_clock_(read_clock) {
+      open_card_(std::move(open_card)) {
   check_options("driver.pci.", options);
 }
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/pci/discovery.hpp"
 #include "driver/pci/register_map.hpp"
@@ -51,10 +51,9 @@ inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in
 /// cycle later, and a width that something else has written since then shows at all. The driver itself gates the motor
 /// enable: the ABS logic has no such bit. The card has no known watchdog, so it is assumed to keep its last duties
 /// after a crash.
-class PciDriver final : public RigDriver {
+class PciDriver final : public BoardDriver {
  public:
   using OpenCard = std::function<Card()>;
-  using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_card called by `configure`; throws Unavailable
   /// @param read_clock  the clock of `now_ns`. The time stamp of the counters is the middle of their reading, so that a
@@ -63,9 +62,6 @@ class PciDriver final : public RigDriver {
   ~PciDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
-  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
-    return grid_.as_sent(command);
-  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] BoardIdentity identity() const override;
@@ -101,10 +97,8 @@ class PciDriver final : public RigDriver {
 
   PciOptions options_;
   PwmMode mode_;
-  OutputGrid grid_;
   OpenCard open_card_;
   Card card_{};
-  ReadClock read_clock_;
   std::uint32_t version_{0};
   std::uint32_t channel_counts_{0};
 

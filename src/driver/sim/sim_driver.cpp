@@ -25,11 +25,11 @@ CountOffsets count_offsets(std::uint64_t seed, double rad_per_count) {
 }
 
 SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start)
-    : plant_(plant),
+    : BoardDriver({.duty_steps = full_width(start.pwm_mode), .any_brake_duty = plant.ideal_actuator}),
+      plant_(plant),
       upper_(plant_sim::upper_encoder(plant)),
       lower_(plant_sim::lower_encoder(plant)),
-      start_(start),
-      grid_{.duty_steps = full_width(start.pwm_mode), .any_brake_duty = plant.ideal_actuator} {
+      start_(start) {
   if (!std::isfinite(start.start_speed_rad_s) || start.start_speed_rad_s < 0.0) {
     throw std::invalid_argument("start speed " + std::to_string(start.start_speed_rad_s) +
                                 " rad/s: give a finite value >= 0");

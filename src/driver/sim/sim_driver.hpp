@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/plant_sim/plant.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/pwm.hpp"
 #include "plant_sim/encoder.hpp"
 
@@ -28,7 +28,7 @@ struct CountOffsets {
 /// The simulated rig at the level of the card: encoder counts out, duty cycles of 12 or 8 bits in. `read` advances the
 /// plant to the given time under the command of the last `write`. In a late cycle the plant has therefore moved on,
 /// too.
-class SimDriver final : public RigDriver {
+class SimDriver final : public BoardDriver {
  public:
   /// Throws std::invalid_argument if an option or the start speed is outside its range.
   SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start);
@@ -36,9 +36,6 @@ class SimDriver final : public RigDriver {
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sim"; }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override;
-  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
-    return grid_.as_sent(command);
-  }
   void note_wheels_apart(bool apart) noexcept override { plant_.part_wheels(apart); }
   void scale_friction(double factor) noexcept { plant_.scale_friction(factor); }
   /// For tests: the command that acts on the simulated rig.
@@ -61,7 +58,6 @@ class SimDriver final : public RigDriver {
   plant_sim::Encoder upper_;
   plant_sim::Encoder lower_;
   SimStart start_;
-  OutputGrid grid_;
   plant_sim::PlantInput input_{};
   std::int64_t time_ns_{0};  ///< time of the plant's state
   CountOffsets offsets_{};

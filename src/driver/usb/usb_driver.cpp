@@ -34,11 +34,10 @@ IoResult with_reason(IoResult result) noexcept {
 }  // namespace
 
 UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock)
-    : options_(options),
+    : BoardDriver(pwm_grid(options), read_clock),
+      options_(options),
       mode_(pwm_mode_named(options.pwm_mode)),
-      grid_(pwm_grid(options)),
-      open_board_(std::move(open_board)),
-      read_clock_(read_clock) {
+      open_board_(std::move(open_board)) {
   check_options("driver.usb.", options);
 }
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
@@ -32,10 +32,9 @@ inline constexpr std::int64_t usb_make_safe_bound_ns = std::int64_t{2} * 2 * pat
 /// and longer if a stall must be cleared. The driver itself gates the motor enable, and also sets a digital line if one
 /// is configured. The board has no known watchdog: it is assumed to keep its last duties when the program dies or the
 /// cable is unplugged.
-class UsbDriver final : public RigDriver {
+class UsbDriver final : public BoardDriver {
  public:
   using OpenBoard = std::function<Board()>;
-  using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_board called by `configure`; throws Unavailable
   /// @param read_clock the clock of `now_ns`. The time stamp of the counters is the middle between request and answer.
@@ -44,9 +43,6 @@ class UsbDriver final : public RigDriver {
   ~UsbDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
-  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
-    return grid_.as_sent(command);
-  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] std::vector<std::string> tally() const override;
@@ -66,9 +62,6 @@ class UsbDriver final : public RigDriver {
   IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override;
 
-  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept {
-    return read_clock_ == nullptr ? otherwise : read_clock_();
-  }
   /// Requests a current frame and waits for it, at most `timeout_ns`. Drops a late frame first.
   IoResult fresh_frame(std::int64_t timeout_ns, Contents& contents) noexcept;
   IoResult lost_frame() noexcept;
@@ -82,9 +75,7 @@ class UsbDriver final : public RigDriver {
 
   UsbOptions options_;
   PwmMode mode_;
-  OutputGrid grid_;
   OpenBoard open_board_;
-  ReadClock read_clock_;
   Board board_{};
 
   std::array<std::uint16_t, identity_words> identity_{};
