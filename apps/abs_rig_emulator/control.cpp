@@ -53,9 +53,13 @@ void ControlCommand::refuse(const std::string& known) const {
   throw std::invalid_argument("unknown command \"" + line_ + "\"; known are\n" + known);
 }
 
-void say_events(const std::vector<emulator::NodeEvent>& events) {
-  for (const emulator::NodeEvent& event : events) {
+void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* changes) {
+  for (const emulator::BoardEvent& event : log.take_events()) {
     say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
+  }
+  for (const auto& [time_ns, now] : log.take_changes()) {
+    if (changes == nullptr) continue;
+    *changes << fmt::format("{} {:.6f} {:.6f}\n", start_ns + time_ns, now.drive_duty, now.brake_duty) << std::flush;
   }
 }
 

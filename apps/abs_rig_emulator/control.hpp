@@ -15,7 +15,6 @@
 
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
-#include "emulator/can_node.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::program {
@@ -108,8 +107,9 @@ constexpr ControlRow<Board> turn_row{
     "turn upper|lower REVOLUTIONS", "a wheel is turned by hand",
     [](Board& b, const ControlCommand& c) { b.model().turn_by_hand(c.first_of(1, "upper", "lower"), c.number(2)); }};
 
-/// Prints what a board has noted.
-void say_events(const std::vector<emulator::NodeEvent>& events);
+/// Prints the events that a board has logged, and writes the changes of its outputs to an open file.
+/// @param start_ns  what the board's time begins at
+void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* changes = nullptr);
 
 /// FIFO from which the emulator takes commands while it runs. An empty path means no FIFO.
 class ControlFifo {

@@ -140,15 +140,7 @@ void EmulatedHm2::catch_up() {
   log_events();
 }
 
-void EmulatedHm2::log_events() {
-  say_events(board_->log().take_events());
-  for (const emulator::OutputChange& change : board_->log().take_changes()) {
-    if (!changes_.is_open()) continue;
-    changes_ << fmt::format("{} {:.6f} {:.6f}\n", time_.start_ns() + change.time_ns, change.now.drive_duty,
-                            change.now.brake_duty)
-             << std::flush;
-  }
-}
+void EmulatedHm2::log_events() { take_log(board_->log(), time_.start_ns(), changes_.is_open() ? &changes_ : nullptr); }
 
 std::string EmulatedHm2::place() const {
   return fmt::format("{} at {}:{}", options_.board.name, options_.address.substr(0, options_.address.find(':')), port_);

@@ -142,7 +142,7 @@ void EmulatedNode::power_on() {
 
 void EmulatedNode::catch_up() {
   time_.catch_up(node_);
-  say_events(node_.take_events());
+  take_log(node_.log(), time_.start_ns());
 }
 
 bool EmulatedNode::serve() {
@@ -153,7 +153,7 @@ bool EmulatedNode::serve() {
     node_.receive(frame);
     for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus_.send(answer);
   }
-  say_events(node_.take_events());
+  take_log(node_.log(), time_.start_ns());
   return true;
 }
 

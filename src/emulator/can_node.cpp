@@ -80,22 +80,8 @@ void CanNode::become(State state, std::uint8_t latch_reason, const std::string& 
   latch_reason_ = latch_reason;
   brake_ = drive_ = 0.0;
   status_due_ = true;
-  events_.push_back({time_ns(), why});
+  log_.add(time_ns(), why);
   note_outputs(why);
-}
-
-void CanNode::note_outputs(const std::string& why) {
-  const Outputs out = outputs();
-  const bool nonzero = out.drive_duty > 0.0 || out.brake_duty > 0.0;
-  if (nonzero_ && !nonzero) {
-    const double since_ms = static_cast<double>(time_ns() - last_command_ns_) * 1e-6;
-    events_.push_back(
-        {time_ns(), "outputs zero: " + why +
-                        (last_command_ns_ < 0 ? "" : rig::formatted("; last valid command %.3f ms ago", since_ms))});
-  } else if (!nonzero_ && nonzero) {
-    events_.push_back({time_ns(), "outputs on"});
-  }
-  nonzero_ = nonzero;
 }
 
 void CanNode::check_interlocks() {
@@ -108,7 +94,7 @@ void CanNode::check_interlocks() {
   if (trip_flags() != trip_told_) {
     trip_told_ = trip_flags();
     status_due_ = true;
-    events_.push_back({time_ns(), rig::formatted("trip flags %u", trip_told_)});
+    log_.add(time_ns(), rig::formatted("trip flags %u", trip_told_));
     note_outputs("interlock");
   }
 }
@@ -291,6 +277,5 @@ void CanNode::send_identity() {
 }
 
 std::vector<BusFrame> CanNode::take_answers() { return std::exchange(answers_, {}); }
-std::vector<NodeEvent> CanNode::take_events() { return std::exchange(events_, {}); }
 
 }  // namespace abs_hil::emulator

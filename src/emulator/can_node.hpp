@@ -34,12 +34,6 @@ struct CanNodeOptions {
   double overspeed_rpm{2200.0};
 };
 
-/// An event for the node's log.
-struct NodeEvent {
-  std::int64_t time_ns{0};  ///< the node's own clock, 0 at power-on
-  std::string text{};
-};
-
 /// The CAN I/O node of docs/can.md with the simulated rig behind it. It latches its counters at a SYNC, applies
 /// commands, and zeroes its outputs when valid commands stop. It was written only from config/can/abs_rig.dbc and
 /// shares no code with the driver.
@@ -54,7 +48,7 @@ class CanNode final : public RigBehind {
   void receive(const BusFrame& frame);
   /// The frames that it has sent since the last call, in order.
   [[nodiscard]] std::vector<BusFrame> take_answers();
-  [[nodiscard]] std::vector<NodeEvent> take_events();
+  [[nodiscard]] OutputLog& log() noexcept { return log_; }
 
   // Events from outside the rig.
   void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
@@ -79,7 +73,7 @@ class CanNode final : public RigBehind {
   void become(State state, std::uint8_t latch_reason, const std::string& why);
   void reject(const char* why);
   void check_interlocks();
-  void note_outputs(const std::string& why);
+  void note_outputs(const std::string& why) { log_.note(time_ns(), outputs(), why, last_command_ns_); }
   [[nodiscard]] std::uint8_t trips_and_state() const noexcept;
   /// Puts the duties that act, brake first.
   void put_applied(BusFrame& frame, std::size_t first) const;
@@ -99,7 +93,6 @@ class CanNode final : public RigBehind {
   double brake_{0.0};
   double drive_{0.0};
   double brake_error_{0.0};
-  bool nonzero_{false};  ///< the outputs were not zero at the last check
   bool overspeed_latched_{false};
   std::uint16_t nonce_{0x1234};
   std::uint8_t sync_sequence_{0};
@@ -116,7 +109,7 @@ class CanNode final : public RigBehind {
   bool host_time_known_{false};
   std::uint64_t host_time_{0};
   std::vector<BusFrame> answers_{};
-  std::vector<NodeEvent> events_{};
+  OutputLog log_{"last valid command"};
 };
 
 }  // namespace abs_hil::emulator

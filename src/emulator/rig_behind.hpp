@@ -1,11 +1,15 @@
-// The simulated rig behind a board, the same for every board.
+// The simulated rig behind a board, the same for every board, and the log of a board's outputs.
 
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "plant_sim/encoder.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
 
@@ -13,6 +17,48 @@ namespace abs_hil::emulator {
 struct Outputs {
   double drive_duty{0.0};
   double brake_duty{0.0};
+};
+
+/// An event for a board's log.
+struct BoardEvent {
+  std::int64_t time_ns{0};  ///< the board's own clock, 0 at power-on
+  std::string text{};
+};
+/// A change of the duties at the power stages.
+struct OutputChange {
+  std::int64_t time_ns{0};  ///< the board's time
+  Outputs now{};
+};
+
+/// The log of a board's outputs in the board's own time.
+class OutputLog {
+ public:
+  /// @param reload  what keeps the watchdog from acting
+  explicit OutputLog(const char* reload = "watchdog last reloaded") : reload_(reload) {}
+
+  void add(std::int64_t time_ns, const std::string& event) { events_.push_back({time_ns, event}); }
+  /// Notes the duties if they have changed. `last_reload_ns`: when the watchdog was last reloaded, -1: never.
+  void note(std::int64_t time_ns, const Outputs& now, const std::string& why, std::int64_t last_reload_ns) {
+    const Outputs before = std::exchange(told_, now);
+    if (now.drive_duty == before.drive_duty && now.brake_duty == before.brake_duty) return;
+    changes_.push_back({time_ns, now});
+    const auto zero = [](const Outputs& out) { return out.drive_duty == 0.0 && out.brake_duty == 0.0; };
+    if (zero(now)) {
+      const double since_ms = static_cast<double>(time_ns - last_reload_ns) * 1e-6;
+      add(time_ns,
+          "outputs zero: " + why + (last_reload_ns < 0 ? "" : rig::formatted("; %s %.3f ms ago", reload_, since_ms)));
+    } else if (zero(before)) {
+      add(time_ns, "outputs on: " + why);
+    }
+  }
+  [[nodiscard]] std::vector<BoardEvent> take_events() { return std::exchange(events_, {}); }
+  [[nodiscard]] std::vector<OutputChange> take_changes() { return std::exchange(changes_, {}); }
+
+ private:
+  const char* reload_;
+  Outputs told_{};
+  std::vector<BoardEvent> events_{};
+  std::vector<OutputChange> changes_{};
 };
 
 /// A slower wheel counts as stopped: it moves less than one encoder line in the card's velocity period.

@@ -4,48 +4,12 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "emulator/can_node.hpp"
 #include "emulator/hm2_identity.hpp"
 #include "emulator/rig_behind.hpp"
-#include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
-
-/// A change of the duties at the power stages.
-struct OutputChange {
-  std::int64_t time_ns{0};  ///< the board's time
-  Outputs now{};
-};
-
-/// The log of a board's outputs in the board's own time.
-class OutputLog {
- public:
-  void add(std::int64_t time_ns, const std::string& event) { events_.push_back({time_ns, event}); }
-  /// Notes the duties if they have changed. `last_reload_ns`: when the watchdog was last reloaded, -1: never.
-  void note(std::int64_t time_ns, const Outputs& now, const std::string& why, std::int64_t last_reload_ns) {
-    const Outputs before = std::exchange(told_, now);
-    if (now.drive_duty == before.drive_duty && now.brake_duty == before.brake_duty) return;
-    changes_.push_back({time_ns, now});
-    const auto zero = [](const Outputs& out) { return out.drive_duty == 0.0 && out.brake_duty == 0.0; };
-    if (zero(now)) {
-      const double since_ms = static_cast<double>(time_ns - last_reload_ns) * 1e-6;
-      add(time_ns, "outputs zero: " + why +
-                       (last_reload_ns < 0 ? "" : rig::formatted("; watchdog last reloaded %.3f ms ago", since_ms)));
-    } else if (zero(before)) {
-      add(time_ns, "outputs on: " + why);
-    }
-  }
-  [[nodiscard]] std::vector<NodeEvent> take_events() { return std::exchange(events_, {}); }
-  [[nodiscard]] std::vector<OutputChange> take_changes() { return std::exchange(changes_, {}); }
-
- private:
-  Outputs told_{};
-  std::vector<NodeEvent> events_{};
-  std::vector<OutputChange> changes_{};
-};
 
 /// A board that a host talks to by datagrams, with the rig behind it.
 class UdpBoard : public RigBehind {
