@@ -1,3 +1,4 @@
+// The program abs_hil with the controllers and boards of this project alone.
 #include <sys/prctl.h>
 
 #include "abs_hil/program/program.hpp"

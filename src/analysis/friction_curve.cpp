@@ -1,3 +1,4 @@
+// Traces friction over slip from encoder counts, by cubics through the counts around each reading.
 #include "analysis/friction_curve.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// A run's summary as JSON and as lines of text.
 #include "analysis/run_summary.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Means with confidence intervals, quantiles and Student's t.
 #include "analysis/statistics.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Carries out the rows of a command line with CLI11.
 #include "cli/command_line.hpp"
 
 #include <CLI/CLI.hpp>

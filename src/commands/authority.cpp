@@ -1,3 +1,4 @@
+// Judges whether a sender knows the key: HMAC-SHA256 over the command and its sequence number.
 #include "commands/authority.hpp"
 
 #include <openssl/crypto.h>

@@ -1,3 +1,4 @@
+// Receives commands in a thread of its own and answers them; a stop counts at once, from anybody.
 #include "commands/command_listener.hpp"
 
 #include <poll.h>

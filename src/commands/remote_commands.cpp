@@ -1,3 +1,4 @@
+// Carries out accepted commands and answers when a cycle shows their effect.
 #include "commands/remote_commands.hpp"
 
 #include <fmt/format.h>

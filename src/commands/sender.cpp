@@ -1,3 +1,4 @@
+// Sends one command and waits for its answer.
 #include "commands/sender.hpp"
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// Reads an effective configuration back from the JSON that a run recorded.
 #include "config/config_json.hpp"
 
 #include <fmt/format.h>

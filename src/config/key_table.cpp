@@ -1,3 +1,4 @@
+// Values of the configuration by their dotted names: setting with checks, printing as TOML and JSON.
 #include "config/key_table.hpp"
 
 #include <fmt/format.h>

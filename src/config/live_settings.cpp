@@ -1,3 +1,4 @@
+// Which settings may change during a run, and their checked change.
 #include "config/live_settings.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Where the model differs from the plant, and settings that look like a mistake, in words.
 #include "config/model.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Writes a plant's file with the meaning, unit and range of each key, to be filled in.
 #include "config/rig_file.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// What settings imply: the rig's identity and the seed of the encoders.
 #include "config/settings.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Reads, writes and compares the records of commissioned boards.
 #include "experiment/board_record.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// One cycle of an experiment: estimates, phase, controller, feed-forward, in this order.
 #include "experiment/run_logic.hpp"
 
 #include <algorithm>

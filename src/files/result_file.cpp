@@ -1,3 +1,4 @@
+// Writes a file under another name, syncs it and renames it. Windows has result_file_windows.cpp.
 #include "files/result_file.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// Exchanges observation and torque with a learning agent through shared memory.
 #include "interchange/agent_controller.hpp"
 
 #include <fcntl.h>

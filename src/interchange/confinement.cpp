@@ -1,3 +1,4 @@
+// Takes files, network, processes and memory away from foreign code: seccomp, Landlock, rlimits.
 #include "interchange/confinement.hpp"
 
 #include <fcntl.h>

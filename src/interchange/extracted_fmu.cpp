@@ -1,3 +1,4 @@
+// Unpacks an FMU with checks of every name and size.
 #include "interchange/extracted_fmu.hpp"
 
 #include <fmt/format.h>

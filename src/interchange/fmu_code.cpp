@@ -1,3 +1,4 @@
+// Calls a controller FMU through FMI 2 or 3.
 #include "interchange/fmu_code.hpp"
 
 #include <fmi/fmi2FunctionTypes.h>

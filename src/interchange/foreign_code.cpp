@@ -1,3 +1,4 @@
+// Loads foreign code by the kind of its file, and names what went wrong in it.
 #include "interchange/foreign_code.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// A controller from a file as one of the registry: where its code runs, and its trial before a run.
 #include "interchange/foreign_controller.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// The process that foreign code runs in: answers steps until the other end closes.
 #include "interchange/host.hpp"
 
 #include <sys/prctl.h>

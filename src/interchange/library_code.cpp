@@ -1,3 +1,4 @@
+// Calls a controller in a shared library through abs_hil/interchange/controller.h.
 #include "interchange/library_code.hpp"
 
 #include <fmt/format.h>

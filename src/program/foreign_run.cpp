@@ -1,3 +1,4 @@
+// What a run with a controller from a file does beside: its trial, its place, its part of the summary.
 #include "program/foreign_run.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// The program abs_guardian: the resident service, or the guardian that a run has started.
 #include <cstdio>
 #include <exception>
 #include <string_view>

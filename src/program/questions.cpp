@@ -1,3 +1,4 @@
+// Puts an experiment's questions to the terminal, and refuses those that nobody could answer.
 #include "program/questions.hpp"
 
 #include <fmt/format.h>

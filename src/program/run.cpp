@@ -1,3 +1,4 @@
+// `abs_hil`: one run with its guardian, files, network and messages, from the request to the exit status.
 #include "run/run.hpp"
 
 #include <fmt/format.h>

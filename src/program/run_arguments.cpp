@@ -1,3 +1,4 @@
+// The options of a run, each one row.
 #include "program/run_arguments.hpp"
 
 namespace abs_hil::program {

@@ -1,3 +1,4 @@
+// Keeps the flight record of a run, and its guardian if it drives a board.
 #include "program/run_monitor.hpp"
 
 #include <fmt/chrono.h>

@@ -1,3 +1,4 @@
+// Shows how far many runs are, and ends them at the first signal.
 #include "program/run_progress.hpp"
 
 #include <fmt/format.h>

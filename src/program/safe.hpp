@@ -1,3 +1,4 @@
+// `abs_hil safe` as typed.
 #pragma once
 
 #include <optional>

@@ -1,3 +1,4 @@
+// Remembers SIGINT, SIGTERM and SIGHUP for whoever polls.
 #include "program/signals.hpp"
 
 #include <fcntl.h>

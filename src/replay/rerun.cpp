@@ -1,3 +1,4 @@
+// Feeds a recorded run through the cycle's parts again, cycle by cycle.
 #include "replay/rerun.hpp"
 
 #include <bit>

@@ -1,3 +1,4 @@
+// Judges whether a value weakens a limit, by the class of its option's row.
 #include "abs_hil/rig/option.hpp"
 
 namespace abs_hil::rig {

@@ -1,3 +1,4 @@
+// Checks of the names that a controller gives its own signals.
 #include "abs_hil/rig/signals.hpp"
 
 #include <algorithm>

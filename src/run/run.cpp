@@ -1,3 +1,4 @@
+// Makes the parts of a run of its settings and drives its cycle in real or virtual time.
 #include "run/run.hpp"
 
 #include <spdlog/spdlog.h>

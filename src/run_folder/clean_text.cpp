@@ -1,3 +1,4 @@
+// Makes bytes from elsewhere fit to show: valid UTF-8 without control characters.
 #include "run_folder/clean_text.hpp"
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// Facts of program and computer for environment.json.
 #include "run_folder/environment.hpp"
 
 #include <fmt/chrono.h>

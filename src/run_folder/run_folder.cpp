@@ -1,3 +1,4 @@
+// Creates a run's folder and seals it with checksums.
 #include "run_folder/run_folder.hpp"
 
 #include <fmt/chrono.h>

@@ -1,3 +1,4 @@
+// The index of a series' runs, and its runs' folders from .part to complete.
 #include "run_folder/series_folder.hpp"
 
 #include <fmt/format.h>

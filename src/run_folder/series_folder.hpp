@@ -1,3 +1,4 @@
+// The folder of a series of runs.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Judges a command and the measurements of each cycle; after a fault only the safe command passes.
 #include "runtime/command_gate.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Histograms of latencies and cycle times, as text in cyclictest's format too.
 #include "runtime/cycle_statistics.hpp"
 
 #include <fmt/format.h>

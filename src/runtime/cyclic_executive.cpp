@@ -1,3 +1,4 @@
+// The cycle: read, estimate, sequence, control, gate, write, record, once per period.
 #include "runtime/cyclic_executive.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Derives the gate's limits from the rig's nominal parameters (docs/safety.md).
 #include "runtime/plausibility_limits.hpp"
 
 #include <limits>

@@ -1,3 +1,4 @@
+// Takes records out of the ring, adds the braking distance, and hands them to the sinks.
 #include "runtime/record_pump.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// The reasons for which the momentum check ends a run.
 #include "runtime/response_check.hpp"
 
 namespace abs_hil::runtime {

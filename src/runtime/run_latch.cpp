@@ -1,3 +1,4 @@
+// Keeps the first fault and the first request to stop.
 #include "runtime/run_latch.hpp"
 
 namespace abs_hil::runtime {

@@ -1,3 +1,4 @@
+// One run until its metrics are complete.
 #include "study/simulated_run.hpp"
 
 namespace abs_hil::study {

@@ -1,3 +1,4 @@
+// A row of the run's CSV each cycle.
 #include "telemetry/csv_sink.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Reads LCM event logs, with checks of sync words, lengths and numbers.
 #include "telemetry/event_log.hpp"
 
 #include <array>

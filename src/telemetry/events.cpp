@@ -1,3 +1,4 @@
+// Finds phases, faults and changes in the stream of records and writes them.
 #include "telemetry/events.hpp"
 
 #include <cmath>

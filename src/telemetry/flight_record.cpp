@@ -1,3 +1,4 @@
+// Writes the last seconds before a fault as CSV, log and account.
 #include "telemetry/flight_record.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Takes LCM's URLs apart.
 #include "telemetry/lcm_url.hpp"
 
 #include <charconv>

@@ -1,3 +1,4 @@
+// Appends messages to an LCM event log.
 #include "telemetry/log_outlet.hpp"
 
 #include <cerrno>

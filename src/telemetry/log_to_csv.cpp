@@ -1,3 +1,4 @@
+// Turns an event log into CSV files, one a channel.
 #include "telemetry/log_to_csv.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Packs a record into telemetry_t and reads it back by the names of its values.
 #include "telemetry/message_codec.hpp"
 
 #include <algorithm>

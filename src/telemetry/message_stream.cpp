@@ -1,3 +1,4 @@
+// Sends telemetry, status, experiment and events, each at its rate, to every outlet.
 #include "telemetry/message_stream.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The line on the terminal during a run: phase, slip, latencies, drops.
 #include "telemetry/status_line.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Greets a tcpq server with a time limit, which liblcm lacks.
 #include "telemetry/tcpq_server.hpp"
 
 #include <arpa/inet.h>

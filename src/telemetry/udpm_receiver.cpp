@@ -1,3 +1,4 @@
+// Receives one channel of LCM's UDP multicast, whole messages only.
 #include "telemetry/udpm_receiver.hpp"
 
 #include <arpa/inet.h>

@@ -1,3 +1,4 @@
+// An FMU's instance: parameters, steps, saved states.
 #include "interchange/fmu/component.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Makes an FMU's model by its kind; its variables as text, with their checks.
 #include "interchange/fmu/model.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// What an FMU computes, and its variables.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// The simulated rig as an FMU's model: its variables and its step.
 #include "interchange/fmu/plant_model.hpp"
 
 #include <cmath>
