@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Finds the theta with which the paper's experiment stops in the 1.2 s of the paper's plots (plant paper-timing).
 
-usage: research/calibrate_timing.py [PROGRAM]    default: build/release/bin/abs_hil
+usage: research/calibrate_timing.py [PROGRAM [--sentences]]    default: build/release/bin/abs_hil
+--sentences prints the sentence of docs/theory.md alone.
 
 Except for theta, the plant is paper-table1: real actuator, 4096-count encoders, adaptive controller at 1 kHz, braking
 from 170 rad/s (1625 rpm, the paper's initial condition) to 0.3 m/s. The result is the mean over three encoder phases.
@@ -33,13 +34,14 @@ def stop_time_s(program, theta_N):
 
 def main():
     program = sys.argv[1] if len(sys.argv) > 1 else 'build/release/bin/abs_hil'
-    found = None
+    found, sentences = None, '--sentences' in sys.argv
     for theta_N in range(40, 57):
         time_s = stop_time_s(program, theta_N)
-        print(f'theta {theta_N} N: {time_s:.3f} s')
+        if not sentences:
+            print(f'theta {theta_N} N: {time_s:.3f} s')
         if found is None and abs(time_s - WANTED_S) <= 0.005:
             found = theta_N
-    print(f'paper-timing: theta = {found} N')
+    print(f'`paper-timing` with θ = {found} N, which reproduces' if sentences else f'paper-timing: theta = {found} N')
 
 
 if __name__ == '__main__':

@@ -2,24 +2,20 @@
 """usage: dense_table.py --check|--write
 
 Compares the optimum with the dense dynamic programme on even roads, and keeps the table of docs/benchmark.md between the lines
-<!-- dense --> and <!-- end -->. --write puts it there, --check fails where the page says something else. A case is computed
-once and kept in runs/dense-table, so that an interrupted computation goes on where it was. Needs casadi and the package
-abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
+<!-- dense --> and <!-- end -->. --write puts it there, --check fails where the page says something else. Needs casadi and the
+package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
-import json
 import os
 import pathlib
 import sys
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / 'scripts'))
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
 from marked_tables import keep  # noqa: E402
 
 from abs_hil.optimum import Rig, optimum  # noqa: E402
 from abs_hil.optimum.dense import Grid, certify  # noqa: E402
 
-KEPT = ROOT / 'runs/dense-table'
 COARSE = Grid(slips=30, torques=12, layer_rad_s=2.0, layer_share=0.1)
 #: plant, changes, start speed in rad/s, grid: a steep curve needs more slips
 CASES = [('paper-table1', {}, 170.0, Grid(slips=100, torques=24)),
@@ -29,17 +25,11 @@ CASES = [('paper-table1', {}, 170.0, Grid(slips=100, torques=24)),
 
 def distances_m(plant, changes, speed_rad_s, grid):
     """Collocation, value and driven distance."""
-    name = '-'.join([plant, f'{speed_rad_s:g}', *(f'{key}={value:.6g}' for key, value in changes.items())])
-    kept = KEPT / f'{name}.json'
-    if not kept.exists():
-        rig = Rig.of(plant=plant, set=changes)
-        found = optimum(plant, changes, start_speed_rad_s=speed_rad_s,
-                        upper_speed_rad_s=speed_rad_s * rig['r2_m'] / rig['r1_m']).distance_m
-        dense = certify(plant, changes, start_speed_rad_s=speed_rad_s, grid=grid)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps([found, dense.value_m, dense.driven_m]), encoding='utf-8')
-        print(f'{name}: {found:.4f} m, dense {dense.value_m:.4f}, driven {dense.driven_m:.4f} m', file=sys.stderr, flush=True)
-    return json.loads(kept.read_text(encoding='utf-8'))
+    rig = Rig.of(plant=plant, set=changes)
+    found = optimum(plant, changes, start_speed_rad_s=speed_rad_s,
+                    upper_speed_rad_s=speed_rad_s * rig['r2_m'] / rig['r1_m']).distance_m
+    dense = certify(plant, changes, start_speed_rad_s=speed_rad_s, grid=grid)
+    return found, dense.value_m, dense.driven_m
 
 
 def table():

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Fits the controllers' tyre model for the plant inteco-manual: theta, B and C of theta sin(C atan(B slip)).
 
-usage: research/fit_inteco_tyre.py [PLANT.toml]    default: config/plants/inteco-manual.toml
+usage: research/fit_inteco_tyre.py [PLANT.toml | --sentences]    default: config/plants/inteco-manual.toml
+--sentences prints the sentence of docs/plants.md alone.
 
 The plant's tyre force depends on the slip and, through the lever, on the brake torque. In braking at a constant slip
 the slip determines the brake torque. The fit therefore uses the force F(slip) there, at half the initial speed of
@@ -62,10 +63,14 @@ def fit(forces):
 
 def main():
     default = pathlib.Path(__file__).parents[1] / 'config' / 'plants' / 'inteco-manual.toml'
-    file = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else default
+    sentences = sys.argv[1:] == ['--sentences']
+    file = default if sentences or len(sys.argv) < 2 else pathlib.Path(sys.argv[1])
     plant = tomllib.loads(file.read_text())['plant']
     forces = [force_N(plant, slip) for slip in SLIPS]
     theta, B, C, squares = fit(forces)
+    if sentences:
+        print(f'prints θ = {theta:.2f} N, B = {B:.2f}, C = {C:.4f} and leaves {math.sqrt(squares / len(SLIPS)):.2f} N RMS')
+        return
     print(f'theta_N = {theta:.2f}\nB = {B:.2f}\nC = {C:.4f}')
     print(f'rms error {math.sqrt(squares / len(SLIPS)):.3f} N')
     print('slip   force N   fit N')

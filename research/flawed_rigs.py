@@ -1,13 +1,17 @@
 #!/usr/bin/env python3
-"""usage: flawed_rigs.py [--rigs N] [--seed N] [--jobs N] [--check]
+"""usage: flawed_rigs.py [--rigs N] [--seed N] [--jobs N] [--check] [--keep FOLDER] [--sentences]
 
 Tries abs_identify on rigs with features that a fit lacks or has, N of each kind, with parameters within 15 % of the plant's
 (those of identification_study.py) and the logs of five experiments. All but those called quiet wander. Prints for each kind
 how many were refused and for what cause, how many intervals of 95 % hold the truth, and how many forms are right.
 --check: status 1 unless, of the intervals given, 90 % hold, all forms are right or undecided, and each refusal names the cause.
+--keep: stores each rig's result in FOLDER, and takes those that it finds there, so that an interrupted run goes on.
+--sentences: prints those of docs/identification.md alone.
 """
 import argparse
+import json
 import os
+import pathlib
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
@@ -31,7 +35,18 @@ KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc'
 KINDS_OF_OTHERS = ('other', 'two lags', 'friction by sliding speed', 'two lags + quiet')
 
 
-def one(plant, kind, seed):
+def one(plant, kind, seed, keep=None):
+    """As `tried`, from the folder `keep` if it is there."""
+    kept = keep and keep / f'{plant}-{kind.replace(" ", "-")}-{seed}.json'
+    if kept and kept.exists():
+        return json.loads(kept.read_text(encoding='utf-8'))
+    found = tried(plant, kind, seed)
+    if kept:
+        kept.write_text(json.dumps(found), encoding='utf-8')
+    return found
+
+
+def tried(plant, kind, seed):
     """(form is right or undecided, intervals that hold, intervals, misfit, the cause that it must name)."""
     random = np.random.default_rng([seed, *f'{plant} {kind}'.encode()])
     features = [word for word in kind.split(' + ') if word]
@@ -56,7 +71,7 @@ def one(plant, kind, seed):
     found = abs_hil.identify(logs, plant, seed=seed)
     held = [e.low <= truth[key] <= e.high for key, e in found.parameters.items() if key in truth and e.low is not None]
     cause = next((OTHERS[word][1] for word in features if word in OTHERS), '')
-    return found.undecided or found.form == form.name, sum(held), len(held), found.misfit, cause
+    return bool(found.undecided or found.form == form.name), int(sum(held)), len(held), found.misfit, cause
 
 
 def main():
@@ -65,13 +80,16 @@ def main():
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     parser.add_argument('--check', action='store_true')
+    parser.add_argument('--keep', type=pathlib.Path)
+    parser.add_argument('--sentences', action='store_true')
     o = parser.parse_args()
+    say = (lambda *_, **__: None) if o.sentences else print
     kinds = [(plant, kind) for kind in KINDS for plant in ('paper-timing', 'inteco-manual')]
     kinds += [('paper-timing', kind) for kind in KINDS_OF_OTHERS]
-    wrong, held, given = [], 0, 0
+    wrong, held, given, formed, refused, lacking, named = [], 0, 0, 0, 0, 0, 0
     with ProcessPoolExecutor(o.jobs) as pool:
-        jobs = [(kind, [pool.submit(one, *kind, o.seed + i) for i in range(o.rigs)]) for kind in kinds]
-        print('| plant | features | right form | refused | intervals that hold |\n|---|---|---|---|---|', flush=True)
+        jobs = [(kind, [pool.submit(one, *kind, o.seed + i, o.keep) for i in range(o.rigs)]) for kind in kinds]
+        say('| plant | features | right form | refused | intervals that hold |\n|---|---|---|---|---|', flush=True)
         for (plant, kind), runs in jobs:
             rows = [run.result() for run in runs]
             for number, (right, _, _, misfit, cause) in enumerate(rows):
@@ -79,11 +97,20 @@ def main():
                     wrong.append(f'{plant}, {kind or "none"}, seed {o.seed + number}: '
                                  f'{"" if right else "wrong form; "}{misfit or "not refused"}')
             hold, of = sum(row[1] for row in rows), sum(row[2] for row in rows)
-            held, given = held + hold, given + of
-            print(f'| `{plant}` | {kind or "none"} | {sum(row[0] for row in rows)} of {len(rows)} | '
+            held, given, formed = held + hold, given + of, formed + sum(row[0] for row in rows)
+            lacking += sum(bool(row[4]) for row in rows)
+            named += sum(bool(row[4]) and row[4] in row[3] for row in rows)
+            refused += sum(bool(row[3]) for row in rows if not row[4])
+            say(f'| `{plant}` | {kind or "none"} | {sum(row[0] for row in rows)} of {len(rows)} | '
                   f'{sum(bool(row[3]) for row in rows)} | {f"{hold} of {of}" if of else "–"} |', flush=True)
-    print(f'\n{held} of {given} intervals hold: {100 * held / max(given, 1):.1f} %')
-    print('\n'.join(wrong))
+    say(f'\n{held} of {given} intervals hold: {100 * held / max(given, 1):.1f} %')
+    say('\n'.join(wrong))
+    if o.sentences:
+        rigs = o.rigs * len(kinds)
+        print(f'Of {rigs} rigs {formed} had the right form. Of the {lacking} with a feature that the plant lacks {named} were '
+              f'refused\n'
+              f'of the other {rigs - lacking} rigs {refused} were refused too\n'
+              f'Of {given} intervals {held} held the truth ({100 * held / max(given, 1):.1f} %)')
     if o.check and (wrong or held < 0.9 * given):
         sys.exit(1)
 

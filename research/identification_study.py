@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """usage: identification_study.py [--plants A,B] [--repetitions N] [--seed N] [--disturbed] [--more A,B] [--jobs N]
-                                [--csv FILE] [--check]
+                                [--csv FILE] [--check] [--keep FOLDER] [--page]
 
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
@@ -10,9 +10,12 @@ tyre's curve is off, and how far controllers that believe the model stop from wh
 --more: experiments of which there is one log more each.
 --check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
 the intervals of all parameters together hold the truth as often as intervals of 95 % do.
+--keep: stores each rig's results in FOLDER, and takes those that it finds there, so that an interrupted study goes on.
+--page: prints the table of docs/identification.md instead, of all the rigs that PAGE names.
 """
 import argparse
 import csv
+import json
 import os
 import pathlib
 import sys
@@ -38,6 +41,11 @@ SPREAD = 0.25
 SPREADS = {'r1_m': 0.02, 'u0': 0.1, 'motor_no_load_speed_rad_s': 0.1, 'C': 0.1, 'mu_p': 0.1}
 WANDER = {'friction': 0.01, 'brake_torque': 0.01, 'motor_torque': 0.005, 'upper_bearing': 0.05, 'lower_bearing': 0.05}
 WANDER_S = 0.2
+
+
+#: of the page's table: disturbed, rigs of each plant, plants
+PAGE = ((False, 60, ('paper-table1', 'paper-timing', 'inteco-manual')),
+        (True, 40, ('paper-timing', 'paper-table1', 'inteco-manual')))
 
 
 def values_of(plant):
@@ -72,8 +80,17 @@ def wandering(duration_s, random):
     return settings
 
 
-def one(plant, seed, disturbed, more):
+def one(plant, seed, disturbed, more, keep=None):
     """A row of results: name -> value."""
+    if keep is None:
+        return measured(plant, seed, disturbed, more)
+    kept = keep / f'{"-".join([plant, str(seed), *(["disturbed"] if disturbed else []), *more])}.json'
+    if not kept.exists():
+        kept.write_text(json.dumps(measured(plant, seed, disturbed, more)), encoding='utf-8')
+    return json.loads(kept.read_text(encoding='utf-8'))
+
+
+def measured(plant, seed, disturbed, more):
     random = np.random.default_rng([seed, *plant.encode()])
     form, truth, start = drawn(plant, random)
     nominal = values_of(plant)
@@ -159,6 +176,30 @@ def table(plant, rows):
         print(f'| `{key}` | {np.nanmedian(errors):.1e} | {np.nanmax(errors):.1e} | {share} | {identified} |')
 
 
+def page_rows(rows_of, disturbed):
+    """Lines of the page's table. rows_of: plant -> rows."""
+    holds = np.array([row[name] for rows in rows_of.values() for row in rows for name in row if name.endswith(' holds')])
+    holds = holds[np.isfinite(holds)]
+    together = (f'{100 * holds.mean():.1f} % of {len(holds):,},', 'all three', 'together')
+    for (plant, rows), words in zip(rows_of.items(), together):
+        distance, force = (100 * np.abs([row[name] for row in rows]) for name in ('distance_error', 'force apart'))
+        rms = np.median([row['rms_counts'] for row in rows])
+        yield (f'| `{plant}`{" that wanders" if disturbed else ""} | {len(rows)} | {rms:.4f} | {np.median(distance):.4f} '
+               f'({distance.max():.4f}) | {np.nanmedian(force):.4f} ({np.nanmax(force):.4f}) | {words} |')
+
+
+def page(o):
+    """The table of docs/identification.md. Raises ValueError for a fit that does not converge."""
+    with ProcessPoolExecutor(o.jobs) as pool:
+        jobs = [(disturbed, {plant: [pool.submit(one, plant, o.seed + i, disturbed, [], o.keep) for i in range(count)]
+                             for plant in plants}) for disturbed, count, plants in PAGE]
+        lines = [line for disturbed, of in jobs
+                 for line in page_rows({plant: [job.result() for job in runs] for plant, runs in of.items()}, disturbed)]
+    head = ('median (worst)', 'rigs', 'residual, counts RMS', 'stop distance of `paper` predicted within %',
+            "tyre's force in braking within %", 'intervals of 95 % that hold the truth')
+    print('\n'.join([f'| {" | ".join(head)} |', '|' + '---|' * len(head), *lines]))
+
+
 #: largest median error of an undisturbed rig's parameter, relative
 LARGEST_ERROR = {'M10_Nm': 3e-3, 'lever_Mg_Nm': 3e-3, 'mu_w4': 3e-3, 'mu_a': 3e-3}
 LARGEST_ERROR_ELSE = 5e-4
@@ -194,11 +235,15 @@ def main():
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     parser.add_argument('--csv', type=pathlib.Path)
     parser.add_argument('--check', action='store_true')
+    parser.add_argument('--keep', type=pathlib.Path)
+    parser.add_argument('--page', action='store_true')
     o = parser.parse_args()
+    if o.page:
+        return page(o)
     every = []
     with ProcessPoolExecutor(o.jobs) as pool:
         for plant in o.plants.split(','):
-            jobs = [pool.submit(one, plant, o.seed + i, o.disturbed, o.more) for i in range(o.repetitions)]
+            jobs = [pool.submit(one, plant, o.seed + i, o.disturbed, o.more, o.keep) for i in range(o.repetitions)]
             rows = []
             for number, job in enumerate(jobs, 1):
                 try:

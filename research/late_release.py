@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""usage: late_release.py
+"""usage: late_release.py [--sentences]
 
 What a late release of the brake costs on steep tyres, whatever the law. A driver brakes with full torque until some time after
 the slip has passed the peak, and is optimal from then on (python -m abs_hil.optimum, even road). The last column says when
 the encoders could first tell the tyre from one of the same stiffness whose peak is half as far away again: either wheel's
-angle is then COUNTS counts off. The cases are the steep tyres at slow starts among those that DRAW draws. Prints the table
-of which docs/theory-beyond.md has the figures for 10 ms. Needs casadi and the package abs_hil of a build
+angle is then COUNTS counts off. The cases are the steep tyres at slow starts among those that DRAW draws. Prints the table;
+--sentences prints docs/theory-beyond.md's sentence on 10 ms. Needs casadi and the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import math
@@ -24,6 +24,7 @@ DRAW, COUNT, SHOWN = 7007, 200, 6
 STEEP = 60.0  # B C, of the slope at no slip over the peak force
 SLOW_RAD_S = 85.0
 LATE_S = (0.0, 0.005, 0.010, 0.015)
+QUOTED_S = 0.010
 FARTHER = 1.5
 COUNTS = 4
 STEP_S = 1e-4
@@ -54,7 +55,8 @@ def told_s(rig, other, speed_rad_s, counts_per_rev):
     return STEP_S * int(np.argmax(apart > COUNTS))
 
 
-def line(case):
+def cells(case):
+    """Of a line of the table."""
     values = {f'plant.{name}': value for name, value in case.changes.items()}
     rig = Rig.of(plant=case.plant, set=values)
     peak = math.tan(math.pi / (2.0 * rig['C'])) / rig['B']
@@ -71,23 +73,34 @@ def line(case):
             costs.append('–')
     farther = {**values, 'plant.theta_N': FARTHER * rig['theta_N'], 'plant.B': rig['B'] / FARTHER}
     told = told_s(rig, Rig.of(plant=case.plant, set=farther), case.start_speed_rad_s, int(rig['encoder_counts_per_rev']))
-    return (f'| {case.name} | {rig["theta_N"]:.0f}, {rig["B"]:.0f}, {rig["C"]:.2f} | {case.start_speed_rad_s:.0f} '
-            f'| {1e3 * passed * STEP_S:.0f} | ' + ' | '.join(costs) + f' | {1e3 * (told - passed * STEP_S):+.0f} |')
+    return [case.name, f'{rig["theta_N"]:.0f}, {rig["B"]:.0f}, {rig["C"]:.2f}', f'{case.start_speed_rad_s:.0f}',
+            f'{1e3 * passed * STEP_S:.0f}', *costs, f'{1e3 * (told - passed * STEP_S):+.0f}']
+
+
+def lines():
+    chosen = [case for case in cases.drawn(DRAW, COUNT) if float(case.changes['B']) * float(case.changes['C']) > STEEP
+              and case.start_speed_rad_s < SLOW_RAD_S][:SHOWN]
+    return [cells(case) for case in chosen]
 
 
 def table():
-    chosen = [case for case in cases.drawn(DRAW, COUNT) if float(case.changes['B']) * float(case.changes['C']) > STEEP
-              and case.start_speed_rad_s < SLOW_RAD_S][:SHOWN]
     heads = ' | '.join(f'{1e3 * late_s:.0f} ms late, %' for late_s in LATE_S)
     return '\n'.join([f'| case | θ, B, C | start rad/s | peak passed at ms | {heads} | told apart, ms after the peak |',
-                      '|---|---|---:|---:|' + '---:|' * len(LATE_S) + '---:|', *map(line, chosen)]) + '\n'
+                      '|---|---|---:|---:|' + '---:|' * len(LATE_S) + '---:|',
+                      *(f'| {" | ".join(line)} |' for line in lines())])
+
+
+def sentence():
+    column = 4 + LATE_S.index(QUOTED_S)
+    lost = sorted((line[column] for line in lines() if line[column] != '–'), key=float)
+    return f'releases it {1e3 * QUOTED_S:.0f} ms after the peak, and is optimal then, loses {lost[0]} to {lost[-1]} %'
 
 
 def main():
-    if sys.argv[1:]:
+    if sys.argv[1:] not in ([], ['--sentences']):
         print(__doc__, file=sys.stderr)
         return 2
-    print(table(), end='')
+    print(sentence() if sys.argv[1:] else table())
     return 0
 
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""usage: other_roads.py SEED COUNT BOUNDS
+"""usage: other_roads.py SEED COUNT BOUNDS [--all]
 
 Brakes on roads and tyres that are in no table and no training: SEED draws COUNT of them. A fourth of the roads each is even,
-changes in steps, in straight lines, or in stripes. Prints how far above the causal optimum some laws end. The optima take a
-minute a case; those that are found are kept in the file BOUNDS, so that another run needs not compute them again. Needs casadi
-and the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
+changes in steps, in straight lines, or in stripes. Prints how far above the causal optimum some laws end: the table
+"other roads" of docs/theory-beyond.md, or, with --all, each law on each kind of road. The optima are kept in the file BOUNDS,
+so that another run needs not compute them again. Needs casadi and the package abs_hil of a build
+(PYTHONPATH=build/release/share/abs_hil/python).
 """
 import os
 import pathlib
@@ -18,6 +19,8 @@ import numpy as np  # noqa: E402
 from abs_hil.benchmark import Case, Entry, bounds, run  # noqa: E402
 from abs_hil.benchmark.cases import ANY_TYRE  # noqa: E402
 
+#: law, road of the page's table; '' for all
+SHOWN = (('adaptive-optimal', 'even'), ('adaptive-optimal', 'stripes'), ('adaptive-optimal', ''), ('adaptive-peak', ''))
 LAWS = ('adaptive-optimal', 'adaptive-peak')
 SEEDS = (1, 2)
 LEVELS = (0.35, 1.0)
@@ -64,7 +67,7 @@ def drawn(seed, count):
 
 
 def main():
-    if len(sys.argv) != 4 or not all(text.isdigit() for text in sys.argv[1:3]):
+    if len(sys.argv) < 4 or not all(text.isdigit() for text in sys.argv[1:3]) or sys.argv[4:] not in ([], ['--all']):
         print(__doc__, file=sys.stderr)
         return 2
     cases = drawn(int(sys.argv[1]), int(sys.argv[2]))
@@ -75,6 +78,8 @@ def main():
     for law in LAWS:
         rows = run(Entry(law, {}), cases, known, SEEDS).rows
         for road in (*ROADS, ''):
+            if (law, road) not in SHOWN and not sys.argv[4:]:
+                continue
             chosen = [row for case, row in zip(np.repeat(cases, len(SEEDS)), rows) if road in ('', case.group)]
             excess = 100.0 * np.array([row['excess'] for row in chosen])
             variation = np.array([row['torque_total_variation_Nm'] for row in chosen])

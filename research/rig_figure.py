@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""usage: rig_figure.py [--check]
+"""usage: rig_figure.py [--check | --to FILE]
 
 Writes docs/figures/rig.svg: the rig, its signals and the program, as README.md shows them. The picture takes its colours
 from the reader's theme, light or dark. With --check it writes nothing and ends with status 1 if the stored file differs.
+--to writes FILE instead.
 """
 import math
 import pathlib
@@ -147,7 +148,9 @@ def main():
             print(f'{target} differs from what {__file__} draws: run it', file=sys.stderr)
             return 1
         return 0
-    if sys.argv[1:]:
+    if sys.argv[1:2] == ['--to'] and len(sys.argv) == 3:
+        target = pathlib.Path(sys.argv[2])
+    elif sys.argv[1:]:
         print(__doc__, file=sys.stderr)
         return 2
     target.write_text(picture(), encoding='utf-8')

@@ -16,15 +16,14 @@ import sys
 import tempfile
 import time
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import ROOT, write  # noqa: E402
 
 TASKS, NODES = 7, 2
 INSIDE = 'ABS_HIL_MILLION_INSIDE'
 
 READ = '''
 import sys, abs_hil
-
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
-from marked_tables import ROOT, write  # noqa: E402
 study = abs_hil.load_study(sys.argv[1])
 print(study.quantiles().to_string(), file=sys.stderr)
 print(study.map("plant.theta_N", "plant.B", "stop_distance_m").round(3).to_string(), file=sys.stderr)

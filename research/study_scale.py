@@ -88,7 +88,7 @@ def main():
             f"{ratio:.2f}" for ratio, _ in parted.values())} |
 '''
     if '--write' not in sys.argv:
-        print(text)
+        print(text, end='')
         return 0
     write('studies.md', 'plan', text)
     return 0
