@@ -108,6 +108,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[str, float]) -> None:
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
     picture = Figure(figsize=(7.2, 3.4), layout='constrained')
     axes = picture.subplots()
@@ -122,7 +123,8 @@ def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[
     axes.grid(color='#e4e4e4')
     axes.legend(fontsize=8)
     kind = path.suffix.removeprefix('.') or 'png'
-    write_whole(path, partial(picture.savefig, format=kind, metadata={'Date': None} if kind == 'svg' else None))
+    with rc_context({'svg.hashsalt': 'abs_hil'}):  # the same bytes each time
+        write_whole(path, partial(picture.savefig, format=kind, metadata={'Date': None} if kind == 'svg' else None))
 
 
 def main(arguments: list[str]) -> int:
