@@ -85,12 +85,7 @@ void CanNode::become(State state, std::uint8_t latch_reason, const std::string& 
 }
 
 void CanNode::check_interlocks() {
-  const double fastest = fastest_rad_s();
-  if (fastest > rad_s_of_rpm(options_.overspeed_rpm)) {
-    overspeed_latched_ = true;
-  } else if (fastest < standstill_rad_s) {
-    overspeed_latched_ = false;
-  }
+  latch_overspeed(fastest_rad_s() > rad_s_of_rpm(options_.overspeed_rpm));
   if (trip_flags() != trip_told_) {
     trip_told_ = trip_flags();
     status_due_ = true;

@@ -93,7 +93,6 @@ class CanNode final : public RigBehind {
   double brake_{0.0};
   double drive_{0.0};
   double brake_error_{0.0};
-  bool overspeed_latched_{false};
   std::uint16_t nonce_{0x1234};
   std::uint8_t sync_sequence_{0};
   std::uint8_t command_sequence_{0};

@@ -144,12 +144,7 @@ void CardModel::trip_overspeed() noexcept {
 }
 
 void CardModel::enforce_limits() noexcept {
-  const double fastest = fastest_rad_s();
-  if (velocity(fastest) > plain_[0x5C / 4]) {
-    overspeed_latched_ = true;
-  } else if (fastest < standstill_rad_s) {
-    overspeed_latched_ = false;
-  }
+  latch_overspeed(velocity(fastest_rad_s()) > plain_[0x5C / 4]);
   if (options_.trip_clears_width && trip_flags() != 0) {
     for (PwmChannel& channel : pwm_) channel.width = 0;
     note_widths(widths_.last_written_ns);

@@ -82,7 +82,6 @@ class CardModel final : public RigBehind {
   std::uint32_t reset_mask_{0};
   std::array<std::uint32_t, encoder_count> zero_{};  ///< raw count at which each counter shows 0
   std::array<std::uint32_t, bytes / 4> plain_{};     ///< registers that only store the written value
-  bool overspeed_latched_{false};
 };
 
 }  // namespace abs_hil::emulator

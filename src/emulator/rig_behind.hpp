@@ -105,6 +105,12 @@ class RigBehind {
   [[nodiscard]] std::int64_t position_at(bool upper_wheel, double angle_rad) const noexcept;
   /// Absolute speed of the faster wheel.
   [[nodiscard]] double fastest_rad_s() const noexcept;
+  /// The overspeed interlock of a board: it stays on until the wheels stand.
+  void latch_overspeed(bool too_fast) noexcept {
+    overspeed_latched_ = too_fast || (overspeed_latched_ && fastest_rad_s() >= standstill_rad_s);
+  }
+  bool overspeed_latched_{false};
+
   [[nodiscard]] bool emergency_stop() const noexcept { return emergency_stop_; }
 
  private:
