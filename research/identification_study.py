@@ -86,7 +86,7 @@ def one(plant, seed, disturbed, more, keep=None):
         return measured(plant, seed, disturbed, more)
     kept = keep / f'{"-".join([plant, str(seed), *(["disturbed"] if disturbed else []), *more])}.json'
     if not kept.exists():
-        kept.write_text(json.dumps(measured(plant, seed, disturbed, more)), encoding='utf-8')
+        kept.write_text(json.dumps(measured(plant, seed, disturbed, more), default=lambda value: value.item()), encoding='utf-8')
     return json.loads(kept.read_text(encoding='utf-8'))
 
 
