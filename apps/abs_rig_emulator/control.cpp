@@ -1,3 +1,4 @@
+// Reads control commands, keeps emulated time, and writes the log of true values, for every board.
 #include "control.hpp"
 
 #include <fcntl.h>

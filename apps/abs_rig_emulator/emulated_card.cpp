@@ -1,3 +1,4 @@
+// The emulated RT-DAC4/PCI as files: registers behind a tree that FUSE shows.
 #include "emulated_card.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// The emulated 7I92T, or the node, behind a UDP socket with a cable that can be pulled.
 #include "emulated_hm2.hpp"
 
 #include <arpa/inet.h>

@@ -1,3 +1,4 @@
+// The emulated CAN node on a CAN interface or a Unix socket.
 #include "emulated_node.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// The emulated RT-DAC/USB2, plugged into this computer's virtual host controller.
 #include "emulated_usb.hpp"
 
 #include <fmt/format.h>

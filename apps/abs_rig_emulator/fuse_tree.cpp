@@ -1,3 +1,4 @@
+// Answers the kernel's FUSE requests about the folder of an emulated card.
 #include "fuse_tree.hpp"
 
 #define FUSE_USE_VERSION 31

@@ -1,3 +1,4 @@
+// A program's command line as rows of options.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// Looks at the CAN interfaces for `abs_hil doctor`.
 #include "diagnosis/can_scan.hpp"
 
 #include <fmt/format.h>

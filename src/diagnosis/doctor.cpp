@@ -1,3 +1,4 @@
+// The checks of `abs_hil doctor`, in order.
 #include "diagnosis/doctor.hpp"
 
 #include <sys/resource.h>

@@ -1,3 +1,4 @@
+// Grades what `abs_hil latency` measured, as text and JSON.
 #include "diagnosis/latency_verdict.hpp"
 
 #include <fmt/format.h>

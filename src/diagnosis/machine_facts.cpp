@@ -1,3 +1,4 @@
+// Reads what of kernel, clock and processors affects timing.
 #include "diagnosis/machine_facts.hpp"
 
 #include <cstdlib>

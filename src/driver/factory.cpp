@@ -1,3 +1,4 @@
+// Finds the backend that driver.kind names and has it make its parts.
 #include "driver/factory.hpp"
 
 #include <algorithm>

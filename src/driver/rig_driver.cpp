@@ -1,3 +1,4 @@
+// The order of a driver's life: configure, activate, read and write, safe, deactivate.
 #include "abs_hil/driver/rig_driver.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// The emulated CAN node's answers, states and watchdog.
 #include "emulator/can_node.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The emulated RT-DAC4/PCI's registers and what they do to the rig.
 #include "emulator/card_model.hpp"
 
 #include <algorithm>

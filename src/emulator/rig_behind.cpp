@@ -1,3 +1,4 @@
+// Advances the simulated rig under a board's outputs.
 #include "emulator/rig_behind.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Speaks USB/IP with the kernel for the emulated USB board.
 #include "emulator/usbip_device.hpp"
 
 #include <algorithm>

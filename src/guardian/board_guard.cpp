@@ -1,3 +1,4 @@
+// The guard's looks: grant, cover, watch, act, give up. See board_guard.hpp for the states.
 #include "guardian/board_guard.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Starts, arms and ends the guardian that a run has of its own.
 #include "guardian/guard.hpp"
 
 #include <fcntl.h>

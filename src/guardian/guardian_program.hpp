@@ -1,3 +1,4 @@
+// What the two guardian programs have in common.
 #pragma once
 
 #include <initializer_list>

@@ -1,3 +1,4 @@
+// The launch configuration as JSON, and the flight record that it asks for.
 #include "guardian/launch_config.hpp"
 
 #include <cstdio>

@@ -1,3 +1,4 @@
+// Sends and receives the packets between controller and service, with their descriptors.
 #include "guardian/lease_wire.hpp"
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// Calls of Linux: processes by their pidfds, packets with descriptors, texts in memory.
 #include "guardian/linux_process.hpp"
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// Notices that the whole machine stood still.
 #include "guardian/machine_pause.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// A guard's report in words.
 #include "guardian/mail.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// `abs_guardian serve`: sets up the guard, its talker and its standby, and runs until it is ended.
 #include <fcntl.h>
 #include <grp.h>
 #include <pwd.h>

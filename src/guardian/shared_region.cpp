@@ -1,3 +1,4 @@
+// Makes, seals and maps the memory that two processes share.
 #include "guardian/shared_region.hpp"
 
 #include <fcntl.h>

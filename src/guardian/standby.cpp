@@ -1,3 +1,4 @@
+// The second guard: acts once if the first dies or stands still.
 #include "guardian/standby.hpp"
 
 #include <algorithm>

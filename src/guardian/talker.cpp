@@ -1,3 +1,4 @@
+// Talks with the service's clients, so that the guard itself never waits for one.
 #include "guardian/talker.hpp"
 
 #include <poll.h>

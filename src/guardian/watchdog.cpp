@@ -1,3 +1,4 @@
+// Decides from heartbeats and stages when outputs must be made safe.
 #include "guardian/watchdog.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The simulated rig: wheels, tyre, brake, motor and encoders, advanced step by step.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// What a cycle knows of the rig: the measurement of a board, and the speeds made of it.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// Opens the CAN socket, sends and receives frames, and tells bus states from error frames.
 #include "driver/can/bus.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// Makes a CAN node safe from a second process.
 #include "driver/can/can_safe_state.hpp"
 
 #include "driver/can/can_driver.hpp"

@@ -1,3 +1,4 @@
+// Asks rtnetlink for the CAN interfaces and reads its answers.
 #include "driver/can/interface_facts.hpp"
 
 #include <linux/can/netlink.h>

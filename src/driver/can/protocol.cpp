@@ -1,3 +1,4 @@
+// Packs and unpacks the node's messages by their table.
 #include "driver/can/protocol.hpp"
 
 #include <cmath>

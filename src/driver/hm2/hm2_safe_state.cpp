@@ -1,3 +1,4 @@
+// Makes a HostMot2 board safe from a second process.
 #include "driver/hm2/hm2_safe_state.hpp"
 
 #include <unistd.h>

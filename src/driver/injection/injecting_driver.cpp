@@ -1,3 +1,4 @@
+// Applies due faults to each call of the driver behind it.
 #include "driver/injection/injecting_driver.hpp"
 
 #include <algorithm>

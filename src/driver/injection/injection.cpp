@@ -1,3 +1,4 @@
+// Reads the text of injected faults.
 #include "driver/injection/injection.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Finds the card in sysfs and checks that a run can use it.
 #include "driver/pci/discovery.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Makes an RT-DAC4/PCI safe from a second process.
 #include "driver/pci/pci_safe_state.hpp"
 
 #include <algorithm>

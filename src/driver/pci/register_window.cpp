@@ -1,3 +1,4 @@
+// Opens, locks, reads and writes the file of a card's registers.
 #include "driver/pci/register_window.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// Finds the board in sysfs by its ids and names.
 #include "driver/usb/discovery.hpp"
 
 #include <linux/usb/ch9.h>

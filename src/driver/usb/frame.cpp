@@ -1,3 +1,4 @@
+// Puts outputs into a frame and takes measurements out of one.
 #include "driver/usb/frame.hpp"
 
 #include "driver/pwm.hpp"

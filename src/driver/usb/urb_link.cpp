@@ -1,3 +1,4 @@
+// Queues and reaps USB request blocks without waiting.
 #include "driver/usb/urb_link.hpp"
 
 #include <fcntl.h>
