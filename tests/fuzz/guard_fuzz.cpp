@@ -1,5 +1,6 @@
 // A guard whose run's page, orders, processes, clock and board do anything: it neither crashes nor leaves an output on.
 #include <cstdint>
+#include <vector>
 
 #include "../guardian/scripted_parts.hpp"
 #include "fuzz_input.hpp"
@@ -37,10 +38,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto look = [&] {
     guard.look();
     News news;
-    driver::FileDescriptor run_page(-1);
-    driver::FileDescriptor guard_page(-1);
-    while (mail.next(news, run_page, guard_page)) {
-      if (news.word == NewsWord::granted) pages.emplace(Pages::as_run({run_page.get(), guard_page.get()}));
+    std::vector<driver::FileDescriptor> page_files;
+    while (mail.next(news, page_files)) {
+      if (news.word == NewsWord::granted)
+        pages.emplace(Pages::as_run({page_files.at(0).get(), page_files.at(1).get()}));
+      page_files.clear();
     }
     clock.sleep_until(std::max(guard.next_ns(), clock.now_ns() + 100 * us));
     story.clear();
