@@ -107,6 +107,24 @@ def test_several_things_wrong_at_once():
     assert score.excess_worst <= 0.15 and score.excess_mean <= 0.03
 
 
+def test_a_law_that_keeps_what_it_learnt_stops_shorter_the_next_time(tmp_path, capsys, monkeypatch):
+    known = bounds.stored()
+    chosen = [case for case in cases.whole_set() if case.group == 'combined'][:6]
+    cold, warm = (run(Entry('adaptive-optimal', {}, first), chosen, known).total for first in (False, True))
+    assert warm.failed == 0 and warm.excess_mean < 0.95 * cold.excess_mean
+    target = tmp_path / 'score.json'
+    monkeypatch.setattr(cases, 'quick_cases', lambda: chosen[:2])
+    assert main(['--quick', '--warm', '--controller', 'adaptive-optimal,pi', '--json', str(target)]) == 0
+    assert '`adaptive-optimal, warm`' in capsys.readouterr().out
+    found = json.loads(target.read_text(encoding='utf-8'))['controllers']
+    assert [(one['name'], one['warm']) for one in found] == [('adaptive-optimal', False), ('adaptive-optimal', True),
+                                                             ('pi', False)]
+    assert found[0]['scores'] != found[1]['scores']
+    assert main(['--verify', str(target)]) == 0
+    assert main(['--quick', '--warm', '--controller', 'pi']) == 2
+    assert 'keeps anything of the last braking' in capsys.readouterr().err
+
+
 def test_the_shipped_gains_are_those_of_the_search():
     """research/search_braking_gains.py --check also computes their scores again."""
     stored = json.loads((pathlib.Path(__file__).parents[2] / 'config/training/gains.json').read_text(encoding='utf-8'))

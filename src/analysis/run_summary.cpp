@@ -105,6 +105,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                                       {"lower", number_or_null(s.lower_eccentricity_rad)}};
   json["config"] = s.config;
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
+  if (!s.learnt.is_null()) json["learnt"] = s.learnt;
   if (!s.foreign_controller.is_null()) json["foreign_controller"] = s.foreign_controller;
   json["model"] = s.model.empty() ? s.plant : s.model;
   json["model_differences"] = s.model_differences;

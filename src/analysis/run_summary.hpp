@@ -38,6 +38,7 @@ struct RunSummary {
   /// Where the model differs from the plant, as {"theta_N": {"model": 23, "plant": 40}}; null: the plant is unknown.
   nlohmann::ordered_json model_differences{};
   std::string model_note{};                     ///< the same in words; empty: nowhere
+  nlohmann::ordered_json learnt{};              ///< keys and values for the next braking on the rig; null: nothing
   nlohmann::ordered_json foreign_controller{};  ///< facts of a controller from a file; null: it is not from a file
   double end_speed_m_s{0.0};                    ///< below this speed the car has stopped
 };

@@ -19,6 +19,7 @@
 #include "config/library.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
+#include "config/prior.hpp"
 #include "driver/injection/injection.hpp"
 #include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"
@@ -164,6 +165,8 @@ void fill(Settings& s, KeyTable& keys, const Sources& sources, const Files& file
   set_all(files.plant, keys);
   set_all(files.model, keys);
   set_all(settings_of(script), keys);
+  if (sources.prior_file)
+    set_all(read_prior(*sources.prior_file, s.model_name.empty() ? s.plant_name : s.model_name), keys);
   set_all(files.config, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {

@@ -16,6 +16,7 @@ namespace abs_hil::config {
 /// What the values of one run come from: files by name, and values as typed.
 struct Sources {
   std::string backend{"sim"};
+  std::optional<std::string> prior_file{};
   std::optional<std::string> config_file{};
   std::optional<std::string> plant{};
   std::optional<std::string> model{};
@@ -44,8 +45,9 @@ struct Configuration {
   std::string toml{};  ///< the same, as a file for --config
 };
 
-/// Merges defaults, plant file, model file, the script's settings, configuration file, named options, assignments and
-/// changes; later ones win. Warns, once in a process, of values that look like a mistake. Throws ConfigError.
+/// Merges defaults, plant file, model file, the script's settings, prior, configuration file, named options,
+/// assignments and changes; later ones win. Warns, once in a process, of values that look like a mistake. Throws
+/// ConfigError.
 [[nodiscard]] Configuration merge(const Sources& sources);
 /// The settings alone, without the texts, which cost as much again.
 [[nodiscard]] Settings merged_settings(const Sources& sources);

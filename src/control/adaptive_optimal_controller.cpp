@@ -252,6 +252,10 @@ std::span<const rig::Signal> AdaptiveOptimalController::signals() const noexcept
   return rows;
 }
 
+std::vector<Learnt> AdaptiveOptimalController::learnt() const {
+  return {{"control.adaptive_optimal.last_peak_slip", bank_.learnt_peak_slip()}};
+}
+
 bool AdaptiveOptimalController::exchange_state(rig::StateBytes& state) {
   state(observer_, force_, speeds_, bank_, reference_, model_error_Nm_, sent_Nm_, search_rad_, last_speeds_, unlearnt_);
   return true;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "control/friction_bank.hpp"
@@ -47,6 +48,7 @@ class AdaptiveOptimalController final : public SlipController {
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
   [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
+  [[nodiscard]] std::vector<Learnt> learnt() const override;
   [[nodiscard]] bool exchange_state(rig::StateBytes& state) override;
 
  private:

@@ -30,6 +30,9 @@ constexpr double error_lasts_s = 0.005;
 // Slower, the slip is made of few counts.
 constexpr double learning_m_s = 1.0;
 constexpr double slip_speed_min_m_s = 0.3;
+// What a braking leaves is this part of the mean peak: a peak that is passed costs more, and the mean is some 13 %
+// high. Chosen on two draws of combined cases (docs/theory-beyond.md).
+constexpr double early = 0.7;
 // A slip counts as past a peak by this part of it.
 constexpr double past_the_peak = 0.1;
 // The level is seen in forces above this.
@@ -75,9 +78,19 @@ template <class Row>
   return sum[0] + sum[1];
 }
 
+/// Of a peak at a slip whose logarithm is known to a standard deviation, not normalised.
+double belief(double peak, double median, double spread) noexcept {
+  return std::exp(-0.5 * square(std::log(peak / median) / spread));
+}
+
 template <class Row>
 void set_lane(Row& row, std::size_t lane, double value) noexcept {
   row.v[lane / rig::Portable::lanes][lane % rig::Portable::lanes] = value;
+}
+
+template <class Row>
+double lane_of(const Row& row, std::size_t lane) noexcept {
+  return row.v[lane / rig::Portable::lanes][lane % rig::Portable::lanes];
 }
 
 /// For each C the coefficients of the polynomial in u = B s / (1 + B s) that meets sin(C atan(B s)) / u at the
@@ -100,7 +113,8 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
   if (!(rate_Hz > 0.0 && quick_delay_s > 0.0)) {
     throw std::invalid_argument("the friction bank needs a control rate and a delay of the quick force > 0");
   }
-  double sum = 0.0;
+  double sum = 0.0, last_sum = 0.0;
+  std::array<Row, rows> last{};
   for (std::size_t k = 0; k < shapes; ++k) {
     const double c = least_shape + (largest_shape - least_shape) * static_cast<double>(k) / (shapes - 1);
     const double at_peak = std::tan(std::numbers::pi / (2.0 * c));
@@ -111,18 +125,26 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
     for (std::size_t j = 0; j < peaks; ++j) {
       const double peak =
           least_peak_slip * std::pow(largest_peak_slip / least_peak_slip, static_cast<double>(j) / (peaks - 1));
-      const double away = std::log(peak / options.slip0) / options.slip_spread;
-      const double prior = std::exp(-0.5 * square(away));
+      const double prior = belief(peak, options.slip0, options.slip_spread);
+      const double after =
+          options.last_peak_slip > 0.0 ? belief(peak, options.last_peak_slip, options.last_peak_spread) : 0.0;
       sum += prior;
+      last_sum += after;
       Members& m = bank_[k * rows_a_shape + j / Row::lanes];
       const std::size_t lane = j % Row::lanes;
       set_lane(m.peak, lane, peak);
       set_lane(m.knee, lane, peak / at_peak);
       set_lane(m.bent, lane, curvature / square(peak));
       set_lane(m.prior, lane, prior);
+      set_lane(last[k * rows_a_shape + j / Row::lanes], lane, after);
     }
   }
   for (Members& m : bank_) m.prior = m.prior / Row(sum);
+  // The rest keeps every member alive: what the last braking has left may be wrong.
+  const double part = options.last_peak_part;
+  for (std::size_t i = 0; last_sum > 0.0 && i < rows; ++i) {
+    bank_[i].prior = (1.0 - part) * bank_[i].prior + last[i] * (part / last_sum);
+  }
   reset({.car_speed_m_s = 1.0});
 }
 
@@ -277,6 +299,15 @@ void FrictionBank::summarise(double runaway_per_N) noexcept {
   slip_zero_ = per * sum_of(zero);
   peak_force_N_ = std::clamp(per * sum_of(theta), theta_min_N, theta_max_N);  // a mean, but for rounding
   force_N_ = per * sum_of(force);
+}
+
+double FrictionBank::learnt_peak_slip() const noexcept {
+  double mean = 0.0;
+  for (const Members& m : bank_) {
+    for (std::size_t lane = 0; lane < Row::lanes; ++lane)
+      mean += lane_of(m.weight, lane) * std::log(lane_of(m.peak, lane));
+  }
+  return early * std::exp(mean);
 }
 
 FrictionBank::Force FrictionBank::at(double slip) const noexcept {

@@ -92,6 +92,9 @@ class FrictionBank {
   /// catch it.
   [[nodiscard]] double runaway() const noexcept { return runaway_; }
   [[nodiscard]] double peak_force_N() const noexcept { return peak_force_N_; }
+  /// Somewhat less than the geometric mean of the members' peaks: what the next braking on the same tyre may begin
+  /// with. Not for the cycle.
+  [[nodiscard]] double learnt_peak_slip() const noexcept;
   /// Force of the curve at the readings, delayed as the quick force is.
   [[nodiscard]] double late_force_N() const noexcept { return late_force_N_; }
   [[nodiscard]] bool jumping() const noexcept { return hold_s_ > 0.0; }

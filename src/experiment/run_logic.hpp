@@ -77,6 +77,7 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
   [[nodiscard]] control::SlipController& controller() noexcept { return *controller_; }
+  [[nodiscard]] const control::SlipController& controller() const noexcept { return *controller_; }
   /// Eccentricity of both encoders' discs as this run has learnt it, 0: sound; NaN where nothing was learnt.
   struct LearntDiscs {
     double upper_rad{rig::unknown};

@@ -30,6 +30,7 @@ RunRequest merge(const RunOptions& options) {
         "--histogram: a run in virtual time (--fast) has no latencies to measure; leave out one of the two");
   }
   config::Sources sources = options;
+  sources.prior_file = options.outputs.prior_file;
   const bool by_itself = options.backend != "rig" && (options.virtual_time || !at_terminal());
   sources.asked = by_itself ? experiment::answers_itself : experiment::answers_person;
   RunRequest request{config::merge(sources), options.outputs, options.virtual_time};

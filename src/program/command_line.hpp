@@ -17,6 +17,7 @@ struct OutputOptions {
   std::optional<std::string> summary_file{};
   std::optional<std::string> histogram_file{};
   std::optional<std::string> recorder_dir{};  ///< --recorder: folder of the flight record, written after a fault
+  std::optional<std::string> prior_file{};    ///< --prior, renewed after a stop
   std::optional<std::string> lcm_url{};
   bool no_lcm{false};
   std::optional<std::string> run_folder{};  ///< --out: a new or empty folder

@@ -54,6 +54,11 @@ void add_output_options(cli::Parser& parser, OutputOptions& o) {
   parser.add({.names = "--csv", .to = &o.csv_file, .help = "write every cycle to a CSV file", .type = "FILE"});
   parser.add({.names = "--log", .to = &o.log_file, .help = "write an LCM event log (.lcmlog)", .type = "FILE"});
   parser.add({.names = "--summary", .to = &o.summary_file, .help = "write the summary as JSON", .type = "FILE"});
+  parser.add({.names = "--prior",
+              .to = &o.prior_file,
+              .help = "what the controller learns for the next braking on this rig: read if the file is there, renewed "
+                      "after each braking that stops",
+              .type = "FILE"});
   parser.add({.names = "--recorder",
               .to = &o.recorder_dir,
               .help = "folder for the flight record: the last 2 s of a run that ended by a fault",

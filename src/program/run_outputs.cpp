@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
+#include "config/prior.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -27,6 +28,7 @@ RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
   }
   try {
     // Open named files first: a bad path then leaves no run folder behind.
+    if (request.outputs.prior_file) prior_.emplace(*request.outputs.prior_file, "prior");
     open_files(request.outputs, request.virtual_time);
     open_folder(request);
   } catch (const std::runtime_error& error) {
@@ -166,6 +168,11 @@ std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
   for (files::ResultFile& file : summary_) attempt([&] { file.write(analysis::to_json(summary).dump(2) + '\n'); });
   for (files::ResultFile& file : histogram_)
     attempt([&] { file.write(runtime::cyclictest_histogram(run_.executive().statistics())); });
+  if (prior_ && !summary.learnt.is_null()) {
+    attempt([&] {
+      prior_->write(config::prior_text(summary.learnt, summary.model.empty() ? summary.plant : summary.model));
+    });
+  }
   if (!folder_) return problems;
   attempt([&] {
     if (const auto& curve = run_.friction_curve()) {

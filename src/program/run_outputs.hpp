@@ -58,6 +58,7 @@ class RunOutputs {
   std::list<telemetry::CsvSink> csv_;
   std::list<files::ResultFile> summary_;
   std::list<files::ResultFile> histogram_;
+  std::optional<files::ResultFile> prior_;
   std::list<telemetry::LogOutlet> log_;
   std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;

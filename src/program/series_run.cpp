@@ -311,6 +311,11 @@ int run_series(const RunOptions& common, const RunRequest& base) {
         "--histogram",
         base.script->path));
   }
+  if (base.outputs.prior_file) {
+    throw config::ConfigError(
+        fmt::format("{}: a series of runs, which must not depend on each other; leave out --prior {}",
+                    base.script->path, *base.outputs.prior_file));
+  }
   const std::vector<config::SeriesMember> members = config::members_of(*base.script, base.settings.seed);
   std::vector<run_folder::SeriesEntry> entries;
   // Check every run's configuration before the first run moves anything.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <span>
 #include <string>
 
@@ -68,6 +69,14 @@ nlohmann::ordered_json differences_json(const config::Settings& s) {
   return json;
 }
 
+/// What the controller leaves for the next braking; null unless this one has stopped the car.
+nlohmann::ordered_json learnt_json(const Run& run, const RunOutcome& outcome) {
+  nlohmann::ordered_json json;
+  if (rig::is_fault(outcome.reason) || std::isnan(run.metrics().metrics().stop_time_s)) return json;
+  for (const control::Learnt& one : run.logic().controller().learnt()) json[one.key] = one.value;
+  return json;
+}
+
 }  // namespace
 
 analysis::RunSummary summarise(const Run& run, const RunOutcome& outcome,
@@ -96,6 +105,7 @@ analysis::RunSummary summarise(const Run& run, const RunOutcome& outcome,
           .model = s.model_name,
           .model_differences = differences_json(s),
           .model_note = config::in_words(config::model_differences(s)),
+          .learnt = learnt_json(run, outcome),
           .foreign_controller = foreign_controller,
           .end_speed_m_s = s.experiment.end_speed_m_s};
 }

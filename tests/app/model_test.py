@@ -40,6 +40,43 @@ class Model(ProgramTest):
                         (float(b['time_s']) - float(a['time_s'])) for a, b in zip(braking, braking[1:]))
         self.assertAlmostEqual(float(braking[-1]['distance_m']), travelled, places=3)
 
+    def test_what_a_braking_has_learnt_begins_the_next_one(self):
+        prior = self.folder / 'prior.toml'
+        law = ('--controller', 'adaptive-optimal', '--set', 'plant.B=9')
+        first, _ = self.summary_of(*law, '--prior', prior)
+        key = 'control.adaptive_optimal.last_peak_slip'
+        self.assertEqual(first['config']['control']['adaptive_optimal']['last_peak_slip'], 0.0)
+        second, _ = self.summary_of(*law, '--prior', prior)
+        self.assertEqual(second['config']['control']['adaptive_optimal']['last_peak_slip'], first['learnt'][key])
+        self.assertLess(second['stop_distance_m'], first['stop_distance_m'])
+        # It is renewed by a stop only, and a law that learns nothing leaves it alone.
+        renewed = prior.read_text()
+        self.assertIn(f'{key} = {second["learnt"][key]}', renewed)
+        self.run_program('--fast', '--no-lcm', *law, '--prior', prior, '--inject', 'brake@encoder_upper:stuck+0.1s')
+        self.assertNotIn('learnt', self.summary_of('--prior', prior)[0])
+        self.assertEqual(prior.read_text(), renewed)
+        # Options rank above it.
+        third, _ = self.summary_of(*law, '--prior', prior, '--set', key + '=0')
+        self.assertEqual(third['stop_distance_m'], first['stop_distance_m'])
+
+    def test_bad_priors(self):
+        prior = self.folder / 'prior.toml'
+        self.fast(*BRAKING, '--controller', 'adaptive-optimal', '--prior', prior)
+        good = prior.read_text()
+
+        def refused(text, *words, args=()):
+            prior.write_text(text)
+            result = self.run_program('--fast', '--no-lcm', '--prior', prior, *args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            for word in (str(prior), *words):
+                self.assertIn(word, result.stderr)
+        refused(good, 'another model than paper-timing', args=('--plant', 'paper-timing'))
+        refused(good.replace('format = 1', 'format = 2'), 'not of format 1')
+        refused('', 'prior.format', 'remove it')
+        refused(good + 'plant.B = 3\n', 'plant.B')
+        refused(good.replace('slip = 0', 'slip = 1'), 'last_peak_slip', '[0, 1)')
+        refused(good, 'series', args=('--experiment', 'series-of-ten'))
+
     def test_whole_models(self):
         summary, _ = self.summary_of('--model', 'paper-timing')
         self.assertEqual((summary['plant'], summary['model']), ('paper-table1', 'paper-timing'))

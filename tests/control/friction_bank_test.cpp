@@ -224,6 +224,45 @@ TEST_CASE("A peak behind which the slip runs away is kept at a distance: an expe
   CHECK(bank.peak_slip() < 0.95 * careless.peak_slip());
 }
 
+TEST_CASE("What the last braking has left decides its part of the first weights") {
+  const double last = 0.12;
+  const control::FrictionBankOptions o{.last_peak_slip = last};
+  const control::FrictionBank bank{o, 1000.0, delay_s};
+  double part[2] = {}, logarithm[2] = {};
+  for (int j = 0; j < 8; ++j) {
+    const double peak = 0.02 * std::pow(12.5, j / 7.0);
+    const double away[2] = {std::log(peak / o.slip0) / o.slip_spread, std::log(peak / last) / o.last_peak_spread};
+    for (const int i : {0, 1}) {
+      part[i] += std::exp(-0.5 * away[i] * away[i]);
+      logarithm[i] += std::exp(-0.5 * away[i] * away[i]) * std::log(peak);
+    }
+  }
+  const double mean = (1.0 - o.last_peak_part) * logarithm[0] / part[0] + o.last_peak_part * logarithm[1] / part[1];
+  CHECK_THAT(bank.learnt_peak_slip(), WithinRel(0.7 * std::exp(mean), 1e-12));
+  // A slip that no member has says nothing.
+  const control::FrictionBank far{{.last_peak_slip = 1e-9, .last_peak_spread = 0.05}, 1000.0, delay_s};
+  CHECK(far.learnt_peak_slip() == control::FrictionBank({}, 1000.0, delay_s).learnt_peak_slip());
+}
+
+TEST_CASE("The last braking helps before the peak is seen, and is forgotten where the force contradicts it") {
+  const rig::TyreParameters tyre{23.0, 12.0, 1.55};  // its peak is at a slip of 0.135
+  const auto braked = [&](double last, double most, double lasts_s) {
+    Rolling rolling{tyre, 0.0, {.last_peak_slip = last}};
+    rolling.noise_N = 0.2;
+    rolling.brake(most, lasts_s);
+    return rolling;
+  };
+  const double peak = rig::peak_slip(tyre);
+  // Up to a fifth of the peak's slip.
+  const Rolling cold = braked(0.0, 0.3 * peak, 0.04);
+  const Rolling warm = braked(peak, 0.3 * peak, 0.04);
+  CHECK(std::abs(std::log(warm.bank.peak_slip() / peak)) < 0.7 * std::abs(std::log(cold.bank.peak_slip() / peak)));
+  for (const double wrong : {0.25, 0.4, 2.0}) {
+    CAPTURE(wrong);
+    CHECK(used(braked(wrong * peak, 1.2 * peak, 0.6), tyre, 0.0) > 0.975);
+  }
+}
+
 TEST_CASE("Delayed speeds are as late as the force") {
   control::DelayedSpeeds delayed;
   control::ForceDelay<double> late;

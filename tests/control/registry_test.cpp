@@ -99,6 +99,8 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
   refused("adaptive-optimal", [=](auto& o) { o.adaptive_optimal.play_Nm = nan; });
   refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.bank.force_noise_N2_s = 0.0; });
   refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.runaway = 0.0; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.bank.last_peak_slip = 1.0; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.bank.last_peak_part = 1.0; });
   refused("mixed-slip-deceleration", [](auto& o) { o.mixed_slip_deceleration.kp_Nm = 0.0; });
   refused("mixed-slip-deceleration", [=](auto& o) { o.mixed_slip_deceleration.weight = nan; });
   refused("braking-stiffness", [](auto& o) { o.braking_stiffness.memory_s = 0.0; });

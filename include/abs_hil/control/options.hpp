@@ -164,6 +164,14 @@ struct FrictionBankOptions {
                  .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_spread, 1.29, .meaning = "standard deviation of the logarithm of the peak's slip",
                  .range = rig::between(0.05, 5));
+  ABS_HIL_OPTION(double, last_peak_slip, 0.0,
+                 .meaning = "slip of the peak that the last braking on this rig has left; 0: there was none",
+                 .range = rig::from_zero_below(1));
+  ABS_HIL_OPTION(double, last_peak_spread, 0.4, .meaning = "standard deviation of its logarithm",
+                 .range = rig::between(0.05, 5));
+  ABS_HIL_OPTION(double, last_peak_part, 0.7,
+                 .meaning = "trust in it: part of the first weights that it decides; slip0 decides the others",
+                 .range = rig::from_zero_below(1));
   ABS_HIL_OPTION(double, level0_N, 12.5, .unit = "N", .meaning = "first guess of the peak's force",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(double, level_spread_N, 24.8, .unit = "N", .meaning = "standard deviation of this guess",

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/signals.hpp"
@@ -54,6 +56,12 @@ struct BasicSlipOutput {
 };
 using SlipOutput = BasicSlipOutput<double>;
 
+/// What a braking has left for the next one on the same rig: a key of the configuration and its value.
+struct Learnt {
+  std::string key;
+  double value;
+};
+
 /// A slip controller: a pure function of its inputs and its own state. It does not use boards, clocks or files.
 /// `reset` and `step` run in the real-time thread: no allocation, lock, system call, exception or log call.
 class SlipController {
@@ -79,6 +87,9 @@ class SlipController {
   /// simulation can branch. Returns false and does nothing if the law cannot, as by default. Not called in the
   /// real-time thread.
   [[nodiscard]] virtual bool exchange_state(rig::StateBytes& state);
+  /// What the next braking on the same rig may begin with, after one that has stopped the car; by default nothing. Not
+  /// called in the real-time thread.
+  [[nodiscard]] virtual std::vector<Learnt> learnt() const { return {}; }
 };
 
 }  // namespace abs_hil::control

@@ -34,7 +34,7 @@ def _standing(results: Sequence[Result]) -> Figure:
 
 
 def _shares(results: Sequence[Result]) -> Figure:
-    by_name = {result.entry.name: result for result in results}
+    by_name = {result.entry.label: result for result in results}
     curves = []
     for number, (name, _) in enumerate(ranked(results)):
         excess = np.array([row['excess'] for row in by_name[name].rows])
@@ -59,6 +59,6 @@ def html(results: Sequence[Result], whole: bool) -> str:
                    for name, score in ranked(results)])
     return render('benchmark.html.j2', figures, _FOLDER, version=_core.version, title=title(whole),
                   all=Table('all', header, cells(results)), groups=groups, worst=worst,
-                  settings=[(result.entry.name, ', '.join(f'{key} = {value}' for key, value in result.entry.settings.items()))
+                  settings=[(result.entry.label, ', '.join(f'{key} = {value}' for key, value in result.entry.settings.items()))
                             for result in results if result.entry.settings],
                   figures=[view(figure) for figure in figures])

@@ -25,7 +25,7 @@ def _cells(score: Score) -> list[str]:
 
 def ranked(results: Sequence[Result], group: str = 'all') -> list[tuple[str, Score]]:
     """The controllers' scores: the best mean excess first, those with failed runs last."""
-    scores = [(result.entry.name, next(score for score in result.scores if score.group == group)) for result in results]
+    scores = [(result.entry.label, next(score for score in result.scores if score.group == group)) for result in results]
     scores.sort(key=lambda pair: (pair[1].failed > 0, math.inf if math.isnan(pair[1].excess_mean) else pair[1].excess_mean))
     return scores
 
@@ -51,7 +51,7 @@ def text(results: Sequence[Result], whole: bool) -> str:
     parts = [f'# {title(whole)}\n', table(results)]
     for score in results[0].scores[:-1]:
         parts += [f'## {score.group}\n', table(results, score.group)]
-    parts += ['## Worst cases\n', '\n'.join(f'- `{result.entry.name}`: {result.total.worst_case}' for result in results) + '\n']
+    parts += ['## Worst cases\n', '\n'.join(f'- `{result.entry.label}`: {result.total.worst_case}' for result in results) + '\n']
     return '\n'.join(parts)
 
 
@@ -61,7 +61,7 @@ def as_json(results: Sequence[Result], whole: bool, program: str) -> str:
 
     document = {'benchmark': 'abs_hil', 'version': VERSION, 'set': cases.checksum(), 'bounds': bounds.checksum(bounds.stored()),
                 'whole': whole, 'program': program, 'controllers': [
-        {'name': result.entry.name, 'settings': dict(result.entry.settings),
+        {'name': result.entry.name, 'warm': result.entry.warm, 'settings': dict(result.entry.settings),
          'scores': [{key: known(value) for key, value in score.as_row().items()} for score in result.scores],
          'runs': [{key: known(value) for key, value in row.items()} for row in result.rows]} for result in results]}
     return json.dumps(document, indent=1, ensure_ascii=False) + '\n'

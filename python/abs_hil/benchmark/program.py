@@ -14,7 +14,7 @@ from ..simulation import controllers
 from . import bounds, cases
 from .html import html
 from .page import as_json, table, text
-from .score import Entry, run
+from .score import Entry, keeps, run
 from .verify import verified
 
 #: differences that --verify prints
@@ -29,6 +29,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--set', metavar='KEY=VALUE', action='append', default=[],
                         help='a value under control. for every controller; may be repeated')
     parser.add_argument('--quick', action='store_true', help='12 cases with one seed: a check, no score')
+    parser.add_argument('--warm', action='store_true',
+                        help='scores laws that keep something of the last braking also after one braking of each case')
     parser.add_argument('--draw', metavar='SEED', type=int, help='only cases that this seed draws; needs casadi')
     parser.add_argument('--count', metavar='N', type=int, default=cases.DRAWN, help=f'how many of them ({cases.DRAWN})')
     parser.add_argument('--bounds', metavar='FILE', type=pathlib.Path,
@@ -88,12 +90,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         names = [name for text in given.controller for name in text.split(',')]
         entries = [Entry(name, settings) for name in names or controllers()]
         chosen, known = _chosen(given)
+        if given.warm:
+            entries = [one for entry in entries for one in
+                       ([entry, Entry(entry.name, settings, True)] if keeps(entry, chosen[0]) else [entry])]
+            if not any(entry.warm for entry in entries):
+                raise ValueError('--warm: none of these controllers keeps anything of the last braking; leave it out, or add '
+                                 '--controller adaptive-optimal')
         whole = not given.quick and given.draw is None
         results = []
         for entry in entries:
             results.append(run(entry, chosen, known, cases.SEEDS[:1] if given.quick else cases.SEEDS, given.threads))
             if len(entries) > 1:
-                print(f'abs_hil benchmark: {entry.name}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
+                print(f'abs_hil benchmark: {entry.label}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
     except (ValueError, RuntimeError, OSError) as error:
         print(f'abs_hil benchmark: {error}', file=sys.stderr)
         return 2

@@ -17,13 +17,23 @@ from .bounds import coasted, identity
 from .cases import COAST_S, END_SPEED_M_S, SEEDS, Case
 
 EXPERIMENT = 'coast-and-brake'
+#: of the braking before those that count, in a warm entry
+FIRST_SEED = 101
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A controller that takes part: a name of the program, a shared library, an FMU, or MODULE:CLASS in Python."""
+    """A controller that takes part: a name of the program, a shared library, an FMU, or MODULE:CLASS in Python.
+
+    warm: each case is braked once before, and the counted brakings begin with what the law has kept of that.
+    """
     name: str
     settings: Mapping[str, Value]
+    warm: bool = False
+
+    @property
+    def label(self) -> str:
+        return f'{self.name}, warm' if self.warm else self.name
 
     @property
     def in_python(self) -> bool:
@@ -43,9 +53,21 @@ def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dic
         values: dict[str, Value] = {
             **case.values(nominal[case.plant]), 'experiment.start_speed_rad_s': coasted(case)[0],
                   'experiment.coast_s': COAST_S, 'experiment.end_speed_m_s': END_SPEED_M_S, **entry.settings}
-        runs += [{'controller': entry.name, 'plant': case.plant, 'experiment': EXPERIMENT, 'seed': seed, 'set': values}
-                 for seed in seeds]
+        run = {'controller': entry.name, 'plant': case.plant, 'experiment': EXPERIMENT, 'set': values}
+        if entry.warm:
+            run['set'] = values | kept(run)
+        runs += [{**run, 'seed': seed} for seed in seeds]
     return runs
+
+
+def kept(run: Mapping[str, Any]) -> dict[str, Value]:
+    """What a law keeps of a braking for the next one on the same rig; nothing of one that did not stop."""
+    return dict(simulate(**{**run, 'seed': FIRST_SEED}).summary.get('learnt', {}))
+
+
+def keeps(entry: Entry, case: Case) -> bool:
+    """Whether a law keeps anything, so that a warm entry of it makes sense."""
+    return not entry.in_python and bool(kept(_runs(entry, [case], [FIRST_SEED])[0]))
 
 
 FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSHOOT, 'slip_largest', 'time_locked_s')

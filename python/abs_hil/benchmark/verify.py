@@ -35,7 +35,7 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
     try:
         document = parse_json(path.read_text(encoding='utf-8'))
         version, stated = document['version'], (document['set'], document['bounds'])
-        entries = [(Entry(str(one['name']), dict(one['settings'])), [dict(row) for row in one['runs']],
+        entries = [(Entry(str(one['name']), dict(one['settings']), bool(one.get('warm'))), [dict(row) for row in one['runs']],
                     [dict(score) for score in one['scores']]) for one in document['controllers']]
         keys = [[(str(row['case']), int(row['seed'])) for row in rows] for _, rows, _ in entries]
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -48,23 +48,23 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
     every = cases.whole_set()
     if document.get('whole'):
         complete = [(case.key, seed) for case in every for seed in cases.SEEDS]
-        found += [f'{entry.name}: the file says that it is whole, and has not all runs of the set'
+        found += [f'{entry.label}: the file says that it is whole, and has not all runs of the set'
                   for (entry, _, _), own in zip(entries, keys) if own != complete]
     for (entry, rows, scores), own in zip(entries, keys):
         if not own:
-            raise ValueError(f'{path}: {entry.name} has no runs')
+            raise ValueError(f'{path}: {entry.label} has no runs')
         names, seeds = list(dict.fromkeys(key for key, _ in own)), list(dict.fromkeys(seed for _, seed in own))
         chosen = [case for case in every if case.key in names]
         if [(case.key, seed) for case in chosen for seed in seeds] != own:
-            raise ValueError(f'{path}: {entry.name} has runs that are not of the set, or in another order; results of --draw '
+            raise ValueError(f'{path}: {entry.label} has runs that are not of the set, or in another order; results of --draw '
                              'cannot be checked, so repeat them')
         fresh = run(entry, chosen, known, seeds, threads)
         for stored, row in zip(rows, fresh.rows):
-            found += _differences(f'{entry.name}, {row["case"]}, seed {row["seed"]}', stored, row)
+            found += _differences(f'{entry.label}, {row["case"]}, seed {row["seed"]}', stored, row)
         groups = [score.group for score in fresh.scores]
         if [score.get('group') for score in scores] != groups:
-            found.append(f'{entry.name}: the file has not one score each for the groups {", ".join(groups)}')
+            found.append(f'{entry.label}: the file has not one score each for the groups {", ".join(groups)}')
             continue
         for stored, score in zip(scores, fresh.scores):
-            found += _differences(f'{entry.name}, group {score.group}', stored, score.as_row())
+            found += _differences(f'{entry.label}, group {score.group}', stored, score.as_row())
     return found
