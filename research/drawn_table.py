@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""usage: drawn_table.py KEPT [--combined | --sentences]
+"""usage: drawn_table.py KEPT [--combined | --warm | --sentences]
 
-Brakings that docs/theory-beyond.md draws besides the benchmark: 200 cases of a seed under five laws. Prints the table
-"drawn"; --sentences prints the sentence on the worst of them, --combined that on two draws of cases with several things wrong
-at once. KEPT is the folder of the bounds drawn.json and combined.json, which research/benchmark_bounds.py computes. Needs
-the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
+Brakings that docs/theory-beyond.md draws besides the benchmark: 200 cases of a seed under five laws. Prints the table "drawn";
+--sentences prints the sentence on the worst of them, --combined that on two draws of cases with several things wrong at once,
+--warm that on three such draws after a stop. KEPT is the folder of the bounds drawn.json and combined.json, which
+research/benchmark_bounds.py computes. Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import pathlib
 import sys
@@ -15,6 +15,8 @@ from abs_hil.benchmark import Entry, bounds, cases, run
 
 SEED, COUNT = 27182, 200
 COMBINED_SEEDS, COMBINED_COUNT, COMBINED_PHASES = (20261126, 20261127), 110, 6
+#: the last one chose nothing of the law
+WARM_SEEDS = (*COMBINED_SEEDS, 20261128)
 OWN = 'adaptive-optimal'
 #: row -> controller, settings
 ROWS = {f'`{OWN}`': (OWN, {}), f'`{OWN}` at 5 kHz': (OWN, {'control.rate_Hz': 5000.0}), '`adaptive-peak`': ('adaptive-peak', {}),
@@ -31,11 +33,11 @@ def combined_cases():
             *(case for case in cases.whole_set() if case.group == 'combined')]
 
 
-def figures(name, settings, chosen, kept, seeds=cases.SEEDS):
+def figures(name, settings, chosen, kept, seeds=cases.SEEDS, warm=False):
     """The chosen cases that have a bound, excess in per cent of shape (cases, seeds), variation in N m, runs that locked."""
     known = bounds.found(chosen, kept)
     bounded = [case for case in chosen if known[bounds.identity(case)]]
-    rows = run(Entry(name, settings), bounded, known, seeds).rows
+    rows = run(Entry(name, settings, warm), bounded, known, seeds).rows
     excess = 100.0 * np.array([row['excess'] for row in rows]).reshape(len(bounded), len(seeds))
     return (bounded, excess, np.array([row['torque_total_variation_Nm'] for row in rows]),
             sum(row['time_locked_s'] > 0.0 for row in rows))
@@ -66,9 +68,19 @@ def combined(kept):
             f'torque variation at most {variation.max():.0f} N m.')
 
 
+def warm(kept):
+    def of_draws(warm):
+        draws = [figures(OWN, {}, cases.combined(seed, COMBINED_COUNT), kept, warm=warm)[1] for seed in WARM_SEEDS]
+        return [', '.join(f'{value:.1f}' for value in values) for values in
+                ([draw.mean() for draw in draws], [np.quantile(draw, 0.9) for draw in draws], [draw.max() for draw in draws])]
+    (mean, most, worst), (warm_mean, warm_most, warm_worst) = of_draws(False), of_draws(True)
+    return (f'seed {WARM_SEEDS[-1]}, two seeds each: mean {mean} %, 90 % {most} %, worst {worst} %; after a stop {warm_mean}, '
+            f'{warm_most} and {warm_worst} %.')
+
+
 def main():
     options = {(): (table, 'drawn.json'), ('--sentences',): (sentences, 'drawn.json'),
-               ('--combined',): (combined, 'combined.json')}
+               ('--combined',): (combined, 'combined.json'), ('--warm',): (warm, 'combined.json')}
     if len(sys.argv) < 2 or tuple(sys.argv[2:]) not in options:
         print(__doc__, file=sys.stderr)
         return 2
