@@ -18,7 +18,7 @@ from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 if TYPE_CHECKING:
     __version__: str
     from .figures import FigureOfMerit, figures
-    from .hand import Controller, Plant, PlantState, SlipInput, SlipOutput
+    from .stepped import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .identification import Identified, identify
     from .network import live
     from .run import Run, Series, load, load_series

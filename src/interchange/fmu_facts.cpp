@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 
 // NOLINTBEGIN(cppcoreguidelines-macro-usage)
 #define ABS_HIL_IN(name) \
-  Quantity { #name, offsetof(abs_hil_input, name) }
+  CarriedQuantity { #name, offsetof(abs_hil_input, name) }
 #define ABS_HIL_OUT(name) \
-  Quantity { #name, offsetof(abs_hil_output, name) }
+  CarriedQuantity { #name, offsetof(abs_hil_output, name) }
 // NOLINTEND(cppcoreguidelines-macro-usage)
 
 constexpr std::array our_inputs{ABS_HIL_IN(time_s),
@@ -87,8 +87,8 @@ const TheirVariable& their(const fs::path& file, const TheirVariables& variables
 
 template <std::size_t count>
 void link(const fs::path& file, const TheirVariables& variables, const toml::table* names, const char* causality,
-          const std::array<Quantity, count>& ours, std::vector<FmuLink>& links) {
-  const auto add = [&](const std::string& name, const Quantity& quantity) {
+          const std::array<CarriedQuantity, count>& ours, std::vector<FmuLink>& links) {
+  const auto add = [&](const std::string& name, const CarriedQuantity& quantity) {
     const TheirVariable& variable = their(file, variables, name, causality);
     if (!is_real(variable)) {
       refuse(file, fmt::format("its variable \"{}\" has type {}; {} needs a real number", name, variable.type,
@@ -102,17 +102,17 @@ void link(const fs::path& file, const TheirVariables& variables, const toml::tab
       const std::string name(key.str());
       const auto text = node.template value<std::string>();
       const auto quantity =
-          std::find_if(ours.begin(), ours.end(), [&](const Quantity& q) { return text && *text == q.name; });
+          std::find_if(ours.begin(), ours.end(), [&](const CarriedQuantity& q) { return text && *text == q.name; });
       if (quantity == ours.end()) {
         std::string known;
-        for (const Quantity& q : ours) known.append(known.empty() ? "" : ", ").append(q.name);
+        for (const CarriedQuantity& q : ours) known.append(known.empty() ? "" : ", ").append(q.name);
         refuse(file, fmt::format("control.foreign.mapping: {}s.\"{}\": give one of {}", causality, name, known));
       }
       add(name, *quantity);
       named.insert(quantity->name);
     }
   }
-  for (const Quantity& quantity : ours) {
+  for (const CarriedQuantity& quantity : ours) {
     if (named.contains(quantity.name)) continue;
     const auto at = variables.find(quantity.name);
     if (at != variables.end() && at->second.causality == causality) add(quantity.name, quantity);

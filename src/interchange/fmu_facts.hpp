@@ -12,7 +12,7 @@
 namespace abs_hil::interchange {
 
 /// A quantity of ours that a variable of an FMU may carry.
-struct Quantity {
+struct CarriedQuantity {
   const char* name;
   std::size_t offset;  ///< in abs_hil_input or abs_hil_output
 };

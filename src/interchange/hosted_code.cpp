@@ -131,7 +131,7 @@ HostedCode::HostedCode(const ForeignSetup& setup) : period_s_(setup.period_s) {
     const ssize_t size = sent ? receive(answer.data(), answer.size(), start_limit_ms) : 0;
     if (size <= static_cast<ssize_t>(sizeof(HostRefusal))) {
       throw std::invalid_argument(fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(),
-                                              obituary(size, answer.data())));
+                                              how_it_ended(size, answer.data())));
     }
     try {
       const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
@@ -209,7 +209,7 @@ ssize_t HostedCode::receive(void* data, std::size_t size, int limit_ms) noexcept
   }
 }
 
-std::string HostedCode::obituary(ssize_t got, const void* answer) noexcept {
+std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
   if (got == static_cast<ssize_t>(sizeof(HostRefusal))) {
     HostRefusal refusal;
     std::memcpy(&refusal, answer, sizeof refusal);
@@ -248,7 +248,7 @@ bool HostedCode::ask(const HostRequest& request, HostAnswer& answer) noexcept {
   constexpr std::uint64_t steps_between_looks = 256;
   const bool crowded = all_steps_ % steps_between_looks == 0 && too_many_threads();
   if (got == static_cast<ssize_t>(sizeof answer) && !crowded) return true;
-  failure_ = fmt::format("its code {} in step {}", obituary(crowded ? -1 : got, &answer), steps_);
+  failure_ = fmt::format("its code {} in step {}", how_it_ended(crowded ? -1 : got, &answer), steps_);
   return false;
 }
 

@@ -45,7 +45,7 @@ class HostedCode final : public ForeignCode {
   void end() noexcept;
   /// Ends the process. Says how it ended by itself, or what was wrong with its answer.
   /// @param got  what `receive` returned for `answer`
-  [[nodiscard]] std::string obituary(ssize_t got, const void* answer) noexcept;
+  [[nodiscard]] std::string how_it_ended(ssize_t got, const void* answer) noexcept;
 
   pid_t pid_{0};
   int socket_{-1};

@@ -122,7 +122,7 @@ void RunOutputs::listen() {
   remote_commands_->set_listener(*command_listener_);
   command_listener_->set_judge([this](const command_t& command) { return remote_commands_->judge(command); });
   command_listener_->listen();
-  stream_->set_farewell([this] {
+  stream_->set_before_end([this] {
     command_listener_->finish();
     remote_commands_->refuse_pending();
   });

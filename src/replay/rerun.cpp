@@ -242,13 +242,13 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
   if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
   if (!rig::is_fault(reason)) return false;
   switch (rig::row_of(reason).found_again) {
-    case rig::FoundAgain::no: return true;
-    case rig::FoundAgain::yes: return false;
-    case rig::FoundAgain::jumped_counts:
+    case rig::ReplayFinds::no: return true;
+    case rig::ReplayFinds::yes: return false;
+    case rig::ReplayFinds::jumped_counts:
       // The gate refuses such counts; the recording then repeats the previous cycle's counts.
       if (n > 0 && run.cycles[n].measured_ns == run.cycles[n - 1].measured_ns) return true;
       return faults == WheelFaults::as_recorded;
-    case rig::FoundAgain::wheel_checks: return faults == WheelFaults::as_recorded;
+    case rig::ReplayFinds::wheel_checks: return faults == WheelFaults::as_recorded;
   }
   return true;
 }

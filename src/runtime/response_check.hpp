@@ -46,13 +46,13 @@ class MomentumWatch {
     now_.end_error_s = speed_window.end_error_s;
     now_.counts_rad = speed_window.resolution_rad_s * speed_window.dt_s;
     const auto uncertain = now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s;
-    return where_asked(lasts, !uncertain);
+    return select_asked(lasts, !uncertain);
   }
   /// Compares the windows that end with those before them. @param ends  what `take` said, true in any lane
   template <class Condition>
   [[nodiscard]] auto conclude(const Condition& ends) noexcept {
     auto verdict = judge(before_, now_);
-    verdict.due = where_asked(ends, before_.lasted_s > 0.0);
+    verdict.due = select_asked(ends, before_.lasted_s > 0.0);
     before_ = chosen(ends, now_, before_);
     now_ = chosen(ends, Window{}, now_);
     return verdict;
@@ -90,7 +90,7 @@ class MomentumWatch {
          {&Window::lasted_s, &Window::travel_kg_m, &Window::upper_kg_m, &Window::motor_Nms, &Window::brake_Nms,
           &Window::begin_error_s, &Window::end_error_s, &Window::counts_rad, &Window::least_brake_Nm,
           &Window::most_brake_Nm, &Window::most_duty, &Window::rolls, &Window::apart}) {
-      window.*sum = where_asked(ends, a.*sum, b.*sum);
+      window.*sum = select_asked(ends, a.*sum, b.*sum);
     }
     return window;
   }
@@ -126,7 +126,7 @@ void MomentumWatch<S>::add(const BasicSpeedWindow<S>& s, const S& brake_Nm) noex
   const S friction_Nm = M20_Nm_ + d2_Nms_rad_ * s.omega2_rad_s;
   const auto begins = now_.lasted_s == 0.0;
   if (rig::any(begins)) [[unlikely]]
-    now_.begin_error_s = where_asked(begins, s.begin_error_s, now_.begin_error_s);
+    now_.begin_error_s = select_asked(begins, s.begin_error_s, now_.begin_error_s);
   now_.lasted_s += s.dt_s;
   now_.travel_kg_m += p_kg_m_s * s.dt_s;
   now_.motor_Nms += (motor_Nm - friction_margin * friction_Nm) * s.dt_s;
@@ -137,8 +137,8 @@ void MomentumWatch<S>::add(const BasicSpeedWindow<S>& s, const S& brake_Nm) noex
   now_.rolls = rig::select(s.omega1_rad_s >= half_rolling_ * s.omega2_rad_s, now_.rolls, S(0.0));
   const auto apart = apart_ > 0.0;
   if (rig::any(apart)) [[unlikely]] {
-    now_.apart = where_asked(apart, S(1.0), now_.apart);
-    now_.upper_kg_m = where_asked(apart, S(now_.upper_kg_m + p1_kg_m_s * s.dt_s), now_.upper_kg_m);
+    now_.apart = select_asked(apart, S(1.0), now_.apart);
+    now_.upper_kg_m = select_asked(apart, S(now_.upper_kg_m + p1_kg_m_s * s.dt_s), now_.upper_kg_m);
   }
 }
 

@@ -11,13 +11,13 @@
 
 namespace abs_hil::runtime {
 
-// where_asked() is for code that goes on only `if (rig::any(asked))`. A single run then knows that the condition holds,
-// so nothing is left to ask. In a pack it holds in some lanes alone. Real-time safe.
+// select_asked() is for code that goes on only `if (rig::any(asked))`. A single run then knows that the condition
+// holds, so nothing is left to ask. In a pack it holds in some lanes alone. Real-time safe.
 
 /// `asked && answer`.
 template <class Condition>
-[[nodiscard, gnu::always_inline]] constexpr Condition where_asked(const Condition& asked,
-                                                                  const Condition& answer) noexcept {
+[[nodiscard, gnu::always_inline]] constexpr Condition select_asked(const Condition& asked,
+                                                                   const Condition& answer) noexcept {
   if constexpr (std::is_same_v<Condition, bool>) {
     return answer;
   } else {
@@ -27,7 +27,7 @@ template <class Condition>
 
 /// `asked ? a : b`.
 template <class Condition, class S>
-[[nodiscard, gnu::always_inline]] constexpr S where_asked(const Condition& asked, const S& a, const S& b) noexcept {
+[[nodiscard, gnu::always_inline]] constexpr S select_asked(const Condition& asked, const S& a, const S& b) noexcept {
   if constexpr (std::is_same_v<Condition, bool>) {
     return a;
   } else {

@@ -34,8 +34,8 @@ class SpeedBounds {
     // The reading is a mean over dt. At its end the wheel may be faster or slower by what dt allows.
     const S low_rad_s = rig::larger(low_rad_s_, S(omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s));
     const S high_rad_s = rig::smaller(high_rad_s_, S(omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s));
-    low_rad_s_ = where_asked(inside, low_rad_s, low_rad_s_);
-    high_rad_s_ = where_asked(inside, high_rad_s, high_rad_s_);
+    low_rad_s_ = select_asked(inside, low_rad_s, low_rad_s_);
+    high_rad_s_ = select_asked(inside, high_rad_s, high_rad_s_);
     return inside;
   }
 
@@ -101,7 +101,7 @@ class WheelWatch {
     const S v2_m_s = r2_m_ * window.omega2_rad_s;
     const S stamps_m_s = (rig::magnitude(v1_m_s) + rig::magnitude(v2_m_s)) * window.stamp_error_s() / window.dt_s;
     const auto agree = rig::magnitude(S(v1_m_s - v2_m_s)) + stamps_m_s <= allowed_m_s(window);
-    return !where_asked(!braked, !agree);
+    return !select_asked(!braked, !agree);
   }
   [[nodiscard]] auto quiet_slip(const BasicSpeedWindow<S>& window) const noexcept {
     constexpr double braked_after_s = 0.15;

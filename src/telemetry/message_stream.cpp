@@ -110,7 +110,7 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
 void MessageStream::finish() {
   if (finished_) return;
   finished_ = true;
-  if (farewell_) farewell_();
+  if (before_end_) before_end_();
   if (started_) send_status();
   std::exception_ptr first_error;
   for (Outlet* outlet : outlets_) {

@@ -54,14 +54,14 @@ class MessageStream : public rig::RecordSink {
   void add(Outlet& outlet) { outlets_.push_back(&outlet); }
 
   /// A function that sends the last messages, after the last record. finish() calls it once, at its beginning.
-  void set_farewell(std::function<void()> farewell) { farewell_ = std::move(farewell); }
+  void set_before_end(std::function<void()> before_end) { before_end_ = std::move(before_end); }
 
   /// A function that makes the tag at the end of every answer's message from the answer without it.
   void set_answer_tag(std::function<std::string(const event_t&)> tag) { answer_tag_ = std::move(tag); }
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Calls the farewell, sends a last ABS_STATUS and finishes every outlet. Then it throws the first files::FileError
-  /// of an outlet.
+  /// Calls what `set_before_end` was given, sends a last ABS_STATUS and finishes every outlet. Then it throws the first
+  /// files::FileError of an outlet.
   void finish() override;
 
   /// Sets the time of the next messages while there are no records, as between two runs.
@@ -113,7 +113,7 @@ class MessageStream : public rig::RecordSink {
   std::uint64_t next_telemetry_cycle_{0};
   double next_status_s_{0.0};
   double next_experiment_s_{0.0};
-  std::function<void()> farewell_;
+  std::function<void()> before_end_;
   std::function<std::string(const event_t&)> answer_tag_;
   bool started_{false};
   bool finished_{false};

@@ -37,7 +37,7 @@ struct Bench {
   Bench() {
     stream.add(captured);
     remote.set_mailbox(mailbox);
-    stream.set_farewell([this] { remote.refuse_pending(); });
+    stream.set_before_end([this] { remote.refuse_pending(); });
     show(0, rig::Reason::none, 0);
   }
   /// The record of cycle `n`.

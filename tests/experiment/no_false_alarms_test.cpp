@@ -179,7 +179,7 @@ Drawn drawn(std::mt19937_64& generator, double start_speed_rad_s) {
 
 /// True for what the checks of the wheels find; a wrong model may still end a run by a limit of the experiment.
 bool is_alarm(rig::Reason reason) {
-  return rig::is_fault(reason) && rig::row_of(reason).found_again == rig::FoundAgain::wheel_checks;
+  return rig::is_fault(reason) && rig::row_of(reason).found_again == rig::ReplayFinds::wheel_checks;
 }
 
 }  // namespace

@@ -165,12 +165,12 @@ TEST_CASE("reasons have three groups: the run goes on, a stop request, a fault")
 }
 
 TEST_CASE("a replay reproduces the reasons that measurements show") {
-  CHECK(row_of(Reason::overspeed).found_again == FoundAgain::yes);
-  CHECK(row_of(Reason::encoder_upper_stuck).found_again == FoundAgain::wheel_checks);
-  CHECK(row_of(Reason::encoder_lower_jumped).found_again == FoundAgain::jumped_counts);
-  CHECK(row_of(Reason::can_bus_off).found_again == FoundAgain::no);
-  CHECK(row_of(Reason::stop_command).found_again == FoundAgain::no);
-  CHECK(row_of(static_cast<Reason>(300)).found_again == FoundAgain::no);
+  CHECK(row_of(Reason::overspeed).found_again == ReplayFinds::yes);
+  CHECK(row_of(Reason::encoder_upper_stuck).found_again == ReplayFinds::wheel_checks);
+  CHECK(row_of(Reason::encoder_lower_jumped).found_again == ReplayFinds::jumped_counts);
+  CHECK(row_of(Reason::can_bus_off).found_again == ReplayFinds::no);
+  CHECK(row_of(Reason::stop_command).found_again == ReplayFinds::no);
+  CHECK(row_of(static_cast<Reason>(300)).found_again == ReplayFinds::no);
 }
 
 TEST_CASE("phases have the names of the CSV") {

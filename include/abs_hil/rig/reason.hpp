@@ -19,7 +19,7 @@ enum class ReasonKind : std::uint8_t {
 };
 
 /// Whether a replay reproduces the reason from the recorded measurements.
-enum class FoundAgain : std::uint8_t {
+enum class ReplayFinds : std::uint8_t {
   no,             ///< it comes from outside: a person, a board, the bus, the operating system
   yes,            ///< sequence, gate or logic find it; the replay repeats recorded adjustments
   wheel_checks,   ///< the gate's checks of the wheels find it, if the recorded commands are those that acted on the rig
@@ -220,14 +220,14 @@ struct ReasonRow {
   std::string_view name;
   Reason reason;
   ReasonKind kind;
-  FoundAgain found_again;
+  ReplayFinds found_again;
   std::string_view text;  ///< in words, for events, logs and summaries
   ReasonValue value{};
 };
 
 inline constexpr std::array reasons{
 #define ABS_HIL_REASON_ROW(name, number, kind, found_again, text, ...) \
-  ReasonRow{#name, Reason::name, ReasonKind::kind, FoundAgain::found_again, text, ReasonValue{__VA_ARGS__}},
+  ReasonRow{#name, Reason::name, ReasonKind::kind, ReplayFinds::found_again, text, ReasonValue{__VA_ARGS__}},
     ABS_HIL_REASONS(ABS_HIL_REASON_ROW)
 #undef ABS_HIL_REASON_ROW
 };
@@ -246,8 +246,8 @@ static_assert(std::ranges::adjacent_find(reasons,
                   reasons.end(),
               "the rows stand in the order of their numbers, and no number comes twice");
 
-inline constexpr ReasonRow unknown_event{"unknown", Reason::none, ReasonKind::none, FoundAgain::no, "unknown reason"};
-inline constexpr ReasonRow unknown_fault{"unknown", Reason::none, ReasonKind::fault, FoundAgain::no, "unknown reason"};
+inline constexpr ReasonRow unknown_event{"unknown", Reason::none, ReasonKind::none, ReplayFinds::no, "unknown reason"};
+inline constexpr ReasonRow unknown_fault{"unknown", Reason::none, ReasonKind::fault, ReplayFinds::no, "unknown reason"};
 
 inline constexpr std::size_t numbers = static_cast<std::size_t>(reasons.back().reason) + 1;
 /// Index of each number's row in `reasons`; reasons.size() for a number without a row.
@@ -291,7 +291,7 @@ inline constexpr auto places = [] {
   return names[static_cast<std::size_t>(kind)];
 }
 
-[[nodiscard]] constexpr std::string_view name_of(FoundAgain found_again) noexcept {
+[[nodiscard]] constexpr std::string_view name_of(ReplayFinds found_again) noexcept {
   constexpr std::array<std::string_view, 4> names{"no", "yes", "wheel checks", "wheel checks, not jumped counts"};
   return names[static_cast<std::size_t>(found_again)];
 }

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ..files import write_text
-from ..hand import Plant
+from ..stepped import Plant
 from ..nesting import parse_json
 from ..options import Value
 from .cases import COAST_S, END_SPEED_M_S, VERSION, Case

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..hand import Plant
+from ..stepped import Plant
 from ..options import PathLike, Value
 from .rig import OMEGA2, SLIP, TORQUE, Rig
 from .trajectory import Trajectory
