@@ -18,11 +18,11 @@ from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 if TYPE_CHECKING:
     __version__: str
     from .figures import FigureOfMerit, figures
-    from .stepped import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .identification import Identified, identify
     from .network import live
     from .run import Run, Series, load, load_series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many, simulate_series
+    from .stepped import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .studies import StudyResults, load_study, simulate_run, study
 
 # Importing the types' modules has put modules under these names.
@@ -30,10 +30,10 @@ globals().update(TYPES)
 
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
 _LATER = {'figures': ('FigureOfMerit', 'figures'),
-          'hand': ('Controller', 'Plant', 'PlantState', 'SlipInput', 'SlipOutput'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
+          'stepped': ('Controller', 'Plant', 'PlantState', 'SlipInput', 'SlipOutput'),
           'studies': ('StudyResults', 'load_study', 'simulate_run', 'study'),
          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many',
                         'simulate_series')}

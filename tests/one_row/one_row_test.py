@@ -26,7 +26,7 @@ REASONS = 'include/abs_hil/rig/reason.hpp'
 ENDS = 'src/experiment/end_conditions.hpp'
 
 # The torque of the command is part of every record and no other quantity: what comes out of a log went into it by this row.
-QUANTITY_ROW = ('    Quantity{"made_up_Nm", "N m", "9.9", Topic::board, Outlet::both, '
+QUANTITY_ROW = ('    Quantity{"made_up_Nm", "N m", "9.9", Topic::board, Destination::both, '
                 '[](auto& c) -> auto& { return c.record.command.brake_torque_Nm; }, "made-up meaning"},')
 FIGURE_ROW = ('    {"made_up_s", &Metrics::made_up_s, "made-up figure", "s", 3, Better::less, true, 16, "made-up figure of merit", '
               '""},')

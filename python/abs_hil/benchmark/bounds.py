@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ..files import write_text
-from ..stepped import Plant
 from ..nesting import parse_json
 from ..options import Value
+from ..stepped import Plant
 from .cases import COAST_S, END_SPEED_M_S, VERSION, Case
 
 if TYPE_CHECKING:

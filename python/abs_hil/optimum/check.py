@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..stepped import Plant
 from ..options import PathLike, Value
+from ..stepped import Plant
 from .rig import OMEGA2, SLIP, TORQUE, Rig
 from .trajectory import Trajectory
 
