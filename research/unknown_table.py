@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: unknown_table.py --check|--write
 
-Computes how much not knowing tyre or road costs at least (python/abs_hil/optimum/unknown.py) in families of the benchmark's cases,
+Computes how much not knowing tyre or road costs at least (research/unknown.py) in families of the benchmark's cases,
 and keeps the table of docs/benchmark.md between the lines <!-- unknown --> and <!-- end -->, and every family in
 docs/reference/unknown.csv. Needs casadi and the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
@@ -15,11 +15,11 @@ import sys
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
 from marked_tables import csv_text, keep  # noqa: E402
+from unknown import ignorance, of_roads, tyre_bound  # noqa: E402
 
 from abs_hil.benchmark import Case, Entry, bounds, cases, run  # noqa: E402
 from abs_hil.optimum import Rig, optimum  # noqa: E402
 from abs_hil.optimum.road import road_of  # noqa: E402
-from abs_hil.optimum.unknown import ignorance, of_roads, tyre_bound  # noqa: E402
 
 LAW = 'adaptive-optimal'
 THETA_N, B = (10.0, 60.0), (10.0, 40.0)  # what the benchmark draws

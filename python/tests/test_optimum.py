@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('casadi')
 
 from abs_hil import Plant, _core  # noqa: E402
-from abs_hil.optimum import END_SPEED_M_S, Rig, drive, drivers, optimum, trajectory, unknown  # noqa: E402
+from abs_hil.optimum import END_SPEED_M_S, Rig, drive, optimum, trajectory  # noqa: E402
 from abs_hil.optimum.__main__ import main  # noqa: E402
 from abs_hil.optimum.dense import Grid, certify  # noqa: E402
 from abs_hil.optimum.guess import Guesser, Policy  # noqa: E402
@@ -169,53 +169,3 @@ def test_program(capsys):
     for wrong in (['--set', 'nothing'], ['--start-speed', '-3'], ['--plant', 'no-such-plant'], ['--end-speed', '99']):
         assert main(wrong) == 2
         assert capsys.readouterr().err.startswith('abs_hil.optimum: ')
-
-
-def tyre(theta_N: float, B: float, C: float) -> Rig:
-    return Rig.of(plant='paper-table1', set={'plant.theta_N': theta_N, 'plant.B': B, 'plant.C': C})
-
-
-def rolling(rig: Rig, speed_rad_s: float) -> np.ndarray:
-    return rig.state(speed_rad_s * rig['r2_m'] / rig['r1_m'], speed_rad_s)
-
-
-def test_not_knowing_a_tyre_costs_nothing_if_there_is_no_other_and_never_less_where_it_lasts():
-    weak, strong = tyre(10.0, 40.0, 1.9), tyre(58.5, 10.0, 1.3)
-    start = rolling(weak, 60.0)
-    assert unknown.ignorance(unknown.of_tyres([weak, weak], start, 20, END_SPEED_M_S)).loss == pytest.approx(0.0, abs=1e-6)
-    found = [unknown.ignorance(unknown.of_tyres([weak, strong], start, periods, END_SPEED_M_S)) for periods in (0, 13, 15)]
-    assert found[0].loss == pytest.approx(0.0, abs=1e-6)
-    assert found[0].loss < 1e-4 < found[1].loss < found[2].loss
-    for one in found:  # the dual meets the brakings found
-        assert one.loss == pytest.approx(one.primal, abs=2e-6)
-    assert found[0].known_m == pytest.approx([optimum(set={f'plant.{name}': rig[name] for name in ('theta_N', 'B', 'C')},
-                                                      start_speed_rad_s=60.0, upper_speed_rad_s=float(rig.omega1_rad_s(start))
-                                                      ).distance_m for rig in (weak, strong)], rel=1e-4)
-
-
-def test_counts_of_two_tyres_part_no_later_than_the_bound_says():
-    # Under full torque, and under torque that comes and goes, on the plant of the program.
-    tyres = [{'plant.theta_N': 10.0, 'plant.B': 40.0, 'plant.C': 1.9}, {'plant.theta_N': 58.5, 'plant.B': 10.0, 'plant.C': 1.3}]
-    rigs = [Rig.of(plant='paper-table1', set=values) for values in tyres]
-    start, count = rolling(rigs[0], 100.0), 2.0 * math.pi / 4096
-    most = unknown.spread_counts(rigs, start, 16)
-    for duties in ([1.0] * 16, [1.0] * 8 + [0.0] * 8, [1.0, 0.0] * 8):
-        plants = [Plant('paper-table1', values) for values in tyres]
-        for plant in plants:
-            plant.reset(omega1_rad_s=float(rigs[0].omega1_rad_s(start)), omega2_rad_s=100.0)
-        for k, duty in enumerate(duties):
-            one, other = (plant.state for plant in plants)
-            apart = abs(one.angle1_rad - other.angle1_rad) + abs(one.angle2_rad - other.angle2_rad)
-            assert apart / count <= most[k] + 1e-6
-            for plant in plants:
-                plant.advance(unknown.PERIOD_S, brake_duty=duty)
-
-
-def test_a_jump_that_nobody_foresees_costs_less_than_the_causal_driver_loses():
-    plant, roads = 'paper-timing', [[Piece(1.0, end=at), Piece(0.5, begin=at)] for at in (0.25, 0.4)]
-    rig = Rig.of(plant=plant)
-    start = rolling(rig, 170.0)
-    found = unknown.ignorance(unknown.of_roads(rig, start, roads, END_SPEED_M_S))
-    causal = [drivers.causal(rig, start, road, END_SPEED_M_S).distance_m for road in roads]
-    assert 0.0 < found.loss <= found.primal + 1e-9
-    assert found.loss < np.mean(np.array(causal) / np.array(found.known_m)) - 1.0

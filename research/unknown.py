@@ -17,8 +17,8 @@ it, so that the commands agree until the first period after it.
 
 m(n) is computed by collocation of all members at once. That finds local optima, so the value used is that of the dual: the
 prices of the agreement are added to each member's cost, and each is solved alone. By weak duality their sum lies below m(n),
-if these single optima are right, as for the bounds of trajectory.py. It is computed, not certified. The load is constant, and
-no wheel stands.
+if these single optima are right, as for the bounds of abs_hil.optimum.trajectory. It is computed, not certified. The load is
+constant, and no wheel stands.
 """
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from .guess import Guesser, Policy
-from .rig import DISTANCE, OMEGA2, SLIP, Rig
-from .road import Piece
-from .trajectory import POINTS, SCALE, SHORTEST_S, SLOPES, SMOOTHNESS, SOLVER, NoOptimum, _mesh
+from abs_hil.optimum.guess import Guesser, Policy
+from abs_hil.optimum.rig import DISTANCE, OMEGA2, SLIP, Rig
+from abs_hil.optimum.road import Piece
+from abs_hil.optimum.trajectory import POINTS, SCALE, SHORTEST_S, SLOPES, SMOOTHNESS, SOLVER, NoOptimum, _mesh
 
 PERIOD_S = 1e-3
 #: of the mean of the L_i in the solver's cost, which is to be about as large as its other numbers
