@@ -232,7 +232,7 @@ void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   if (const std::string problem = standstill_too_early(s); !problem.empty()) warn_once(problem);
   if (const std::string problem = slip_out_of_reach(script, s); !problem.empty()) warn_once(problem);
   if (!asks(script)) return;
-  if (s.experiment.answers == "auto") s.experiment.answers = sources.asked;
+  if (s.experiment.answers == "auto") s.experiment.answers = sources.answered_by;
   if (sources.virtual_time && s.experiment.answers == experiment::answers_person) {
     throw ConfigError(
         fmt::format("experiment {} asks a person: a run in virtual time (--fast) cannot wait; leave out --fast, or "

@@ -33,8 +33,8 @@ struct Sources {
   std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
   std::optional<std::string> realtime{};  ///< --rt; none: require on a real board, otherwise prefer
   bool virtual_time{false};               ///< as fast as possible, not in real time
-  /// Who answers the questions of an experiment if experiment.answers is auto: ExperimentOptions::answers.
-  std::string asked{experiment::answers_itself};
+  /// A person or the simulation itself answers an experiment's questions if experiment.answers is auto.
+  std::string answered_by{experiment::answers_itself};
 };
 
 /// The effective configuration of one run.

@@ -32,7 +32,7 @@ constexpr double learning_m_s = 1.0;
 constexpr double slip_speed_min_m_s = 0.3;
 // What a braking leaves is this part of the mean peak: a peak that is passed costs more, and the mean is some 13 %
 // high. Chosen on two draws of combined cases (docs/theory-beyond.md).
-constexpr double early = 0.7;
+constexpr double kept_part = 0.7;
 // A slip counts as past a peak by this part of it.
 constexpr double past_the_peak = 0.1;
 // The level is seen in forces above this.
@@ -307,7 +307,7 @@ double FrictionBank::learnt_peak_slip() const noexcept {
     for (std::size_t lane = 0; lane < Row::lanes; ++lane)
       mean += lane_of(m.weight, lane) * std::log(lane_of(m.peak, lane));
   }
-  return early * std::exp(mean);
+  return kept_part * std::exp(mean);
 }
 
 FrictionBank::Force FrictionBank::at(double slip) const noexcept {

@@ -32,7 +32,7 @@ RunRequest merge(const RunOptions& options) {
   config::Sources sources = options;
   sources.prior_file = options.outputs.prior_file;
   const bool by_itself = options.backend != "rig" && (options.virtual_time || !at_terminal());
-  sources.asked = by_itself ? experiment::answers_itself : experiment::answers_person;
+  sources.answered_by = by_itself ? experiment::answers_itself : experiment::answers_person;
   RunRequest request{config::merge(sources), options.outputs, options.virtual_time};
   if (request.settings.experiment.wait_for_start) check_start(request);
   return request;

@@ -1,4 +1,4 @@
-// Remembers SIGINT, SIGTERM and SIGHUP for whoever polls.
+// Notes SIGINT, SIGTERM and SIGHUP. A run asks for them between its cycles, or is told by the handler.
 #include "program/signals.hpp"
 
 #include <fcntl.h>
