@@ -28,42 +28,50 @@
 
 #include <array>
 #include <cstddef>
+#include <cstring>
+#include <memory>
+#include <type_traits>
 
 #include "abs_hil/control/options.hpp"
+#include "abs_hil/rig/scalar.hpp"
+#include "control/friction_curves.hpp"
 #include "control/lower_wheel_force.hpp"
 #include "rig/pack.hpp"
 
 namespace abs_hil::control {
 
-/// Learns the tyre's curve by the equations above. Real-time safe except for the constructor.
-class FrictionBank {
+/// Learns the tyre's curve by the equations above. Real-time safe except for the constructor. In lanes each member is a
+/// pack, and sums run in the same order.
+template <class S>
+class BasicFrictionBank {
  public:
-  static constexpr std::size_t peaks = 8;   ///< different slips of the peak
-  static constexpr std::size_t shapes = 3;  ///< different shape factors C
-  static constexpr std::size_t members = peaks * shapes;
+  static constexpr std::size_t peaks = friction_curves::peaks;
+  static constexpr std::size_t shapes = friction_curves::shapes;
 
+  BasicFrictionBank() = default;
   /// @param quick_delay_s  by which `Data::quick_force_N` follows the force, > 0
   /// Throws std::invalid_argument for options out of range.
-  FrictionBank(const FrictionBankOptions& options, double rate_Hz, double quick_delay_s);
+  BasicFrictionBank(const FrictionBankOptions& options, double rate_Hz, double quick_delay_s)
+    requires std::is_same_v<S, double>;
 
   /// Amplitudes of the once-a-turn errors that encoder discs off their centres may cause; 0: the discs are known.
   struct Swing {
-    double force_N{0.0};
-    double quick_force_N{0.0};
-    double speed_m_s{0.0};
+    S force_N{0.0};
+    S quick_force_N{0.0};
+    S speed_m_s{0.0};
   };
   struct Data {
-    double dt_s{0.0};  ///< > 0
-    double slip{0.0};
-    double late_slip{0.0};  ///< as late as `force_N`
-    double car_speed_m_s{0.0};
-    double force_N{0.0};        ///< of LowerWheelForce
-    double covered{0.0};        ///< of LowerWheelForce
-    double quick_force_N{0.0};  ///< less exact and less delayed
+    S dt_s{0.0};  ///< > 0
+    S slip{0.0};
+    S late_slip{0.0};  ///< as late as `force_N`
+    S car_speed_m_s{0.0};
+    S force_N{0.0};        ///< of LowerWheelForce
+    S covered{0.0};        ///< of LowerWheelForce
+    S quick_force_N{0.0};  ///< less exact and less delayed
     Swing swing{};
     /// The rate at which the slip grows for each newton that the force falls per unit of slip, r1^2 / (J1 v), over the
     /// brake's rate c31; 1/N.
-    double runaway_per_N{0.0};
+    S runaway_per_N{0.0};
   };
   /// Readings as braking begins: without force, they are the slip at no force.
   struct Start {
@@ -72,91 +80,163 @@ class FrictionBank {
     double force_N{0.0};        ///< of the tyre
     double swing_m_s{0.0};      ///< of the difference of both speeds, by their discs
   };
-  void reset(const Start& start) noexcept;
+  void reset(const Start& start) noexcept
+    requires std::is_same_v<S, double>;
   void learn(const Data& data) noexcept;
 
   struct Force {
-    double N{0.0};
-    double spread_N{0.0};  ///< standard deviation
+    S N{0.0};
+    S spread_N{0.0};  ///< standard deviation
   };
   /// Expected force at a reading of the slip.
-  [[nodiscard]] Force at(double slip) const noexcept;
+  [[nodiscard]] Force at(const S& slip) const noexcept;
   /// Expected force at the last reading.
-  [[nodiscard]] double force_N() const noexcept { return force_N_; }
+  [[nodiscard]] const S& force_N() const noexcept { return force_N_; }
   /// The slip at which the expected loss of force is least. It counts from no force: the reading there is this less
   /// `slip_zero`.
-  [[nodiscard]] double peak_slip() const noexcept { return peak_slip_; }
+  [[nodiscard]] const S& peak_slip() const noexcept { return peak_slip_; }
   /// z: the slip reads -z where no force acts.
-  [[nodiscard]] double slip_zero() const noexcept { return slip_zero_; }
+  [[nodiscard]] const S& slip_zero() const noexcept { return slip_zero_; }
   /// Rate at which the slip grows a tenth past the peak, over the brake's rate c31. From 1 on the brake is too slow to
   /// catch it.
-  [[nodiscard]] double runaway() const noexcept { return runaway_; }
-  [[nodiscard]] double peak_force_N() const noexcept { return peak_force_N_; }
+  [[nodiscard]] const S& runaway() const noexcept { return runaway_; }
+  [[nodiscard]] const S& peak_force_N() const noexcept { return peak_force_N_; }
   /// Somewhat less than the geometric mean of the members' peaks: what the next braking on the same tyre may begin
   /// with. Not for the cycle.
-  [[nodiscard]] double learnt_peak_slip() const noexcept;
+  [[nodiscard]] double learnt_peak_slip() const noexcept
+    requires std::is_same_v<S, double>;
   /// Force of the curve at the readings, delayed as the quick force is.
-  [[nodiscard]] double late_force_N() const noexcept { return late_force_N_; }
-  [[nodiscard]] bool jumping() const noexcept { return hold_s_ > 0.0; }
-  [[nodiscard]] int jumps() const noexcept { return jumps_; }
+  [[nodiscard]] const S& late_force_N() const noexcept { return late_force_N_; }
+  [[nodiscard]] auto jumping() const noexcept { return hold_s_ > 0.0; }
+  [[nodiscard]] const S& jumps() const noexcept { return jumps_; }
 
  private:
-  /// Members of one shape side by side, as the vectors of any machine compute them.
-  using Row = rig::Pack<rig::Portable, 4>;
-  static constexpr std::size_t rows = members / Row::lanes;
-  static constexpr std::size_t rows_a_shape = peaks / Row::lanes;
-  static constexpr std::size_t terms = 10;
+  /// Members of one shape that are computed at once: of a run alone as many as the vectors of any machine hold, in
+  /// lanes one.
+  static constexpr bool alone = std::is_same_v<S, double>;
+  using Row = std::conditional_t<alone, rig::Pack<rig::Portable, 4>, S>;
+  static constexpr std::size_t rows_a_shape = alone ? 1 : peaks;
+  /// A word of each member of a shape. Lanes have the same words as a run alone, so the same alignment in words.
+  struct alignas(2 * sizeof(S)) LaneWords : std::array<S, peaks> {};
+  using Words = std::conditional_t<alone, Row, LaneWords>;
 
-  /// A shape phi of (4) over u = s/(1 + s), s = |slip| over its knee: phi = u P(u), and the slope of phi over u.
-  struct Shape {
-    std::array<double, terms> value{};
-    std::array<double, terms> slope{};
+  struct Options {
+    S force_bandwidth_rad_s{0.0}, force_noise_N2_s{0.0}, force_error{0.0}, timing_error_s{0.0}, slip_noise_m_s{0.0};
+    S start_s{0.0}, level0_N{0.0}, level_spread_N{0.0}, zero_error_m_s{0.0}, zero_error_per_N{0.0};
+    S past_peak_cost{0.0}, level_drift_per_s{0.0}, level_drift_unexplained_per_s{0.0}, zero_drift_per_s{0.0};
+    S share_per_s{0.0}, jump_share{0.0}, jump_least_N{0.0}, jump_confirm_s{0.0}, jump_hold_s{0.0};
+    S jump_time_constant_s{0.0}, jump_spread{0.0}, jump_after_s{0.0};
   };
+  struct LaneDelay {
+    std::array<Words, 3> lags{};
+    Words last{}, before{};
+  };
+  /// Those of one shape.
   struct Members {
-    Row knee;  ///< slips 1/B
-    Row peak;  ///< slips
-    Row bent;  ///< -phi'' at the peak
-    Row prior;
-    Row theta_N, zero;
-    Row theta_variance, covariance, zero_variance;
-    Row weight;
-    ForceDelay<Row> phi;
-    Row now;  ///< the curve at the last reading
+    Words prior{};
+    Words theta_N{}, zero{};
+    Words theta_variance{}, covariance{}, zero_variance{};
+    Words weight{};
+    std::conditional_t<alone, ForceDelay<Row>, LaneDelay> phi{};
+    Words now{};  ///< the curve at the last reading
   };
   /// What all members compare their curves with in a cycle.
   struct Look {
-    double slip, late_slip, covered;
-    double slip_offset;  ///< of the delayed readings from `late_slip`
-    double force_N;
-    double noise_N2;      ///< variance of the force
-    double slip_error2;   ///< variance of the slip
-    double theta_growth;  ///< of the variance of ln theta
-    double zero_growth;   ///< of the variance of the zero
-    double back;          ///< share of the weights that returns to the prior
-    bool learns, compares;
+    S slip, late_slip, covered;
+    S slip_offset;  ///< of the delayed readings from `late_slip`
+    S force_N;
+    S noise_N2;      ///< variance of the force
+    S slip_error2;   ///< variance of the slip
+    S theta_growth;  ///< of the variance of ln theta
+    S zero_growth;   ///< of the variance of the zero
+    S back;          ///< share of the weights that returns to the prior
+  };
+  /// A sum over all members. Those of a run alone have the order of its vectors: even and odd peaks apart.
+  class Sum {
+   public:
+    void add(std::size_t row, const Row& of_all_shapes) noexcept {
+      if constexpr (alone) {
+        auto sum = of_all_shapes.v[0];
+        for (std::size_t i = 1; i < std::size(of_all_shapes.v); ++i) sum += of_all_shapes.v[i];
+        even_ = sum[0];
+        odd_ = sum[1];
+      } else {
+        S& sum = row % 2 == 0 ? even_ : odd_;
+        sum = sum + of_all_shapes;
+      }
+    }
+    [[nodiscard]] S value() const noexcept { return even_ + odd_; }
+
+   private:
+    S even_{0.0}, odd_{0.0};
   };
 
-  [[nodiscard]] static Row value(const Shape& shape, const Row& knee, const Row& slip) noexcept;
-  [[nodiscard]] static Row slope(const Shape& shape, const Row& knee, const Row& slip) noexcept;
-  static void learn(const Shape& shape, const Look& look, Members& m) noexcept;
-  void watch_for_jumps(const Data& data) noexcept;
-  void summarise(double runaway_per_N) noexcept;
+  template <class Any>
+  [[nodiscard, gnu::always_inline]] static auto& row_of(Any& words, [[maybe_unused]] std::size_t row) noexcept {
+    if constexpr (alone) {
+      return words;
+    } else {
+      return words[row];
+    }
+  }
+  /// Numbers that all runs have in common.
+  [[nodiscard, gnu::always_inline]] static Row numbers(const friction_curves::OfPeaks& of_peaks,
+                                                       [[maybe_unused]] std::size_t row) noexcept {
+    if constexpr (alone) {
+      Row r;
+      const auto* first = std::assume_aligned<sizeof(r.v[0])>(of_peaks.data());
+      for (std::size_t i = 0; i < std::size(r.v); ++i) std::memcpy(&r.v[i], first + 2 * i, sizeof(r.v[i]));
+      return r;
+    } else {
+      return Row(of_peaks[row]);
+    }
+  }
+  /// The delay of a row's curves: itself, or in lanes a copy that goes back by `keep`.
+  [[nodiscard, gnu::always_inline]] static decltype(auto) delay_of(Members& m,
+                                                                   [[maybe_unused]] std::size_t row) noexcept {
+    if constexpr (alone) {
+      return (m.phi);
+    } else {
+      const auto& d = m.phi;
+      return ForceDelay<Row>{{{d.lags[0][row], d.lags[1][row], d.lags[2][row]}}, d.last[row], d.before[row]};
+    }
+  }
+  [[gnu::always_inline]] static void keep([[maybe_unused]] Members& m, [[maybe_unused]] std::size_t row,
+                                          [[maybe_unused]] const ForceDelay<Row>& delay) noexcept {
+    if constexpr (!alone) {
+      for (std::size_t i = 0; i < m.phi.lags.size(); ++i) m.phi.lags[i][row] = delay.lags.lag[i];
+      m.phi.last[row] = delay.last;
+      m.phi.before[row] = delay.before;
+    }
+  }
+  [[nodiscard, gnu::always_inline]] static Row within(const Row& x, const Row& least, const Row& most) noexcept {
+    return rig::smaller(rig::larger(x, least), most);
+  }
 
-  FrictionBankOptions options_;
-  double rate_Hz_;
-  double quick_delay_s_;
-  std::array<Shape, shapes> shapes_{};
-  std::array<Members, rows> bank_{};
-  ForceDelay<double> late_slip_;
-  double time_s_{0.0};
-  double hold_s_{0.0};
-  double unexplained_s_{0.0};
-  double unexplained_N_{0.0};  ///< of the force of late
-  double force_N_{0.0};
-  double late_force_N_{0.0};
-  double runaway_{0.0};
-  double peak_slip_{0.0}, slip_zero_{0.0}, peak_force_N_{0.0};
-  int jumps_{0};
+  template <class Condition>
+  static void learn(const Look& look, Condition learns, Condition compares, std::size_t shape, Members& m) noexcept;
+  template <class Condition>
+  void follow_jump(const Condition& where, const S& dt_s, const S& residual_N) noexcept;
+  void watch_for_jumps(const Data& data) noexcept;
+  void summarise(const S& runaway_per_N) noexcept;
+
+  Options options_{};
+  S rate_Hz_{0.0};
+  S quick_delay_s_{0.0};
+  std::array<Members, shapes> bank_{};
+  ForceDelay<S> late_slip_{};
+  S time_s_{0.0};
+  S hold_s_{0.0};
+  S unexplained_s_{0.0};
+  S unexplained_N_{0.0};  ///< of the force of late
+  S force_N_{0.0};
+  S late_force_N_{0.0};
+  S runaway_{0.0};
+  S peak_slip_{0.0}, slip_zero_{0.0}, peak_force_N_{0.0};
+  S jumps_{0.0};
 };
+using FrictionBank = BasicFrictionBank<double>;
 
 }  // namespace abs_hil::control
+
+#include "control/friction_bank_learning.hpp"

@@ -23,13 +23,6 @@ constexpr double start_limit_s = 600.0;
 /// The slip that a change of the motor or the start leaves fades within this time; no cubic follows that.
 constexpr double slip_settles_s = 0.05;
 
-/// What the discs' eccentricity may be as a run begins. Where nothing is learnt, the model's holds.
-double unlearnt_rad(const RunLogicParts& parts) noexcept {
-  const control::ObserverOptions& options = parts.control.observer;
-  const bool known = parts.rig.upper_encoder.eccentricity_rad > 0.0 || parts.rig.lower_encoder.eccentricity_rad > 0.0;
-  return known || !(options.learn_eccentricity_s > 0.0) ? 0.0 : options.unlearnt_eccentricity_rad;
-}
-
 struct FastestChange {
   double upper{0.0};
   double lower{0.0};
@@ -70,6 +63,11 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
           .answers_itself = experiment.answers != answers_person};
 }
 
+double unlearnt_disc_rad(const control::ObserverOptions& options, const rig::RigParameters& model) noexcept {
+  const bool known = model.upper_encoder.eccentricity_rad > 0.0 || model.lower_encoder.eccentricity_rad > 0.0;
+  return known || !(options.learn_eccentricity_s > 0.0) ? 0.0 : options.unlearnt_eccentricity_rad;
+}
+
 RunLogic::RunLogic(RunLogicParts parts)
     : identity_(parts.identity),
       ideal_actuator_(parts.ideal_actuator),
@@ -87,7 +85,7 @@ RunLogic::RunLogic(RunLogicParts parts)
       learns_eccentricity_(parts.control.observer.learn_eccentricity_s > 0.0),
       upper_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
       lower_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
-      disc_error_rad_(unlearnt_rad(parts)),
+      disc_error_rad_(unlearnt_disc_rad(parts.control.observer, parts.rig)),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
       own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)),
       answers_itself_(parts.answers_itself) {}

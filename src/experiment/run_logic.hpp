@@ -49,6 +49,11 @@ struct RunLogicParts {
                                              const runtime::GateOptions& gate, const ExperimentOptions& experiment,
                                              std::vector<PhasePlan> plans, const SequenceLimits& limits = {});
 
+/// What the eccentricity of the encoders' discs may be as a run begins, rad. Where nothing is learnt, the model's
+/// holds.
+[[nodiscard]] double unlearnt_disc_rad(const control::ObserverOptions& options,
+                                       const rig::RigParameters& model) noexcept;
+
 /// The logic of one run's cycle: estimate, sequence, control; from counts to the wanted command.
 class RunLogic final : public runtime::CycleLogic {
  public:

@@ -30,7 +30,7 @@ struct BasicSlipInput {
   S lower_travel_rad{rig::unknown};
   /// Once-a-turn error that these angles may have, because the encoders' discs have not been learnt yet, rad; 0:
   /// learnt.
-  double disc_error_rad{0.0};
+  S disc_error_rad{0.0};
   /// Static torque b(u) that was really sent in the previous cycle, N m: after the PWM's steps, the command gate and
   /// the driver. 0 in the first cycle of a phase.
   S sent_brake_torque_Nm{0.0};
