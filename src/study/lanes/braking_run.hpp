@@ -117,7 +117,8 @@ struct BrakingCourse {
   LaneSequence<S> sequence{};
   LaneWheel<S> upper{};
   LaneWheel<S> lower{};
-  S ideal_sensors{0.0};  ///< 1: the controller reads the true speeds
+  S ideal_sensors{0.0};   ///< 1: the controller reads the true speeds
+  S disc_error_rad{0.0};  ///< that the readings may have
   control::BasicBrakeActuator<S> actuator{};
   analysis::BrakingFigures<S> figures{};
   rig::BrakingDistance<S> distance{};
@@ -182,6 +183,7 @@ struct BrakingCourse {
             .alpha2_rad_s2 = lower.alpha_rad_s2,
             .upper_travel_rad = upper.travel_rad,
             .lower_travel_rad = lower.travel_rad,
+            .disc_error_rad = disc_error_rad,
             .sent_brake_torque_Nm = sent_Nm,
             .unsent_torque_Nm = unsent_Nm};
   }

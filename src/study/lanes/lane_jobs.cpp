@@ -148,6 +148,9 @@ struct KindOf {
                     std::vector<double>& words) {
     const auto* controller = dynamic_cast<const control::LawController<Law>*>(parts.controller.get());
     if (controller == nullptr) return false;
+    if constexpr (requires { controller->law().has_lanes(); }) {
+      if (!controller->law().has_lanes()) return false;
+    }
     const auto tyre = model_of<Tyre<double>>(plant.tyre);
     if (!tyre) return false;
     const auto load =
@@ -162,6 +165,8 @@ struct KindOf {
     run.rig.brake = rig::BasicBrake<double>(job.plant.rig.brake);
     run.rig.ideal_brake = job.plant.ideal_actuator ? 1.0 : 0.0;
     run.ideal_sensors = job.plant.ideal_sensors ? 1.0 : 0.0;
+    if (!job.plant.ideal_sensors)
+      run.disc_error_rad = experiment::unlearnt_disc_rad(parts.settings.control.observer, model);
     run.rig.rad_per_count = rig::radians_per_count(job.plant.rig.encoder_counts_per_rev);
     const driver::CountOffsets offsets = driver::count_offsets(job.seed, run.rig.rad_per_count);
     run.rig.upper_offset_rad = offsets.upper_rad;

@@ -5,6 +5,7 @@
 #include "abs_hil/plant_sim/tyre_models.hpp"
 #include "control/adaptive_actuator_controller.hpp"
 #include "control/adaptive_controller.hpp"
+#include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
 #include "control/classic_controllers.hpp"
@@ -28,6 +29,7 @@
   ABS_HIL_LANE_PLANTS(each, control::SlidingModeActuatorLaw)   \
   ABS_HIL_LANE_PLANTS(each, control::AdaptiveActuatorLaw)      \
   ABS_HIL_LANE_PLANTS(each, control::AdaptivePeakLaw)          \
+  ABS_HIL_LANE_PLANTS(each, control::AdaptiveOptimalLaw)       \
   ABS_HIL_LANE_PLANTS(each, control::MixedSlipDecelerationLaw) \
   ABS_HIL_LANE_PLANTS(each, control::BrakingStiffnessLaw)
 #define ABS_HIL_LANE_PLANTS(each, law)                                  \

@@ -116,13 +116,15 @@ void draw_conditions(std::mt19937_64& generator, plant_sim::PlantOptions& plant)
   }
 }
 
+/// Up to `most` times as large or small.
+void scale(std::mt19937_64& generator, double& value, double most) {
+  value *= std::exp(std::log(most) * std::uniform_real_distribution<double>(-1.0, 1.0)(generator));
+}
+
 /// Random settings of everything that `compare` and studies vary, and of much that they do not.
 Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>& plants) {
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   const auto chance = [&](double p) { return uniform(generator) < p; };
-  const auto scaled = [&](double& value, double most) {
-    value *= std::exp(std::log(most) * (2.0 * uniform(generator) - 1.0));
-  };
   Case c{plants[generator() % plants.size()], {}};
   config::Settings& s = c.settings;
   const auto controllers = control::controllers();
@@ -131,11 +133,11 @@ Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>&
   s.experiment.start_speed_rad_s = 20.0 + 200.0 * uniform(generator);
   if (chance(0.3)) s.experiment.end_speed_m_s = 0.05 + 5.0 * uniform(generator);
   if (chance(0.3)) s.control.slip_ref = 0.02 + 0.3 * uniform(generator);
-  if (chance(0.3)) scaled(s.control.adaptive.gamma, 10.0);
-  if (chance(0.2)) scaled(s.control.adaptive.ks1, 4.0);
-  if (chance(0.2)) scaled(s.control.adaptive.ka1, 10.0);
-  if (chance(0.2)) scaled(s.control.sliding_mode.gain_m_s2, 2.0);
-  if (chance(0.2)) scaled(s.control.observer.bandwidth_rad_s, 4.0);
+  if (chance(0.3)) scale(generator, s.control.adaptive.gamma, 10.0);
+  if (chance(0.2)) scale(generator, s.control.adaptive.ks1, 4.0);
+  if (chance(0.2)) scale(generator, s.control.adaptive.ka1, 10.0);
+  if (chance(0.2)) scale(generator, s.control.sliding_mode.gain_m_s2, 2.0);
+  if (chance(0.2)) scale(generator, s.control.observer.bandwidth_rad_s, 4.0);
   if (chance(0.15)) s.control.rate_Hz = 200.0 + 2800.0 * uniform(generator);
   if (chance(0.15)) s.model.encoder_counts_per_rev = 512 << (generator() % 6);
   if (chance(0.15)) s.driver.sim.pwm_mode = "8-bit";
@@ -175,6 +177,29 @@ std::vector<Outcome> batch(const std::vector<Case>& cases, std::size_t threads, 
       },
       [&](std::size_t i, Outcome outcome) { outcomes[place(i)] = std::move(outcome); });
   return outcomes;
+}
+
+/// Computes the cases alone and in the lanes of each set: most of them are complete there, `scalar` have none.
+void require_bits_of_simulate(const std::vector<Case>& cases, std::size_t scalar) {
+  BatchCounts none;
+  const std::vector<Outcome> alone = [&] {
+    const Lanes lanes("none");
+    return batch(cases, 2, none);
+  }();
+  for (const char* set : sets()) {
+    const Lanes lanes(set);
+    BatchCounts counts;
+    const std::vector<Outcome> outcomes = batch(cases, 2, counts);
+    INFO(set << ": " << counts.lanes << " in lanes, " << counts.disturbed << " disturbed, " << counts.scalar
+             << " scalar");
+    CHECK(counts.lanes > cases.size() / 2);
+    CHECK(counts.scalar == scalar);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      INFO(i << ", seed " << cases[i].job.seed);
+      REQUIRE(outcomes[i].refusal == alone[i].refusal);
+      REQUIRE(same_bits(outcomes[i].run, alone[i].run));
+    }
+  }
 }
 
 }  // namespace
@@ -219,11 +244,11 @@ TEST_CASE("every run of a batch has the bits of simulate, whatever runs beside i
   }
 }
 
-TEST_CASE("every law but a user's and adaptive-optimal has lanes, on every plant, road and drift") {
+TEST_CASE("every law but a user's has lanes, on every plant, road and drift") {
   REQUIRE(registered);
   std::mt19937_64 generator(23);
   for (const control::ControllerEntry& entry : control::controllers()) {
-    const bool scalar = entry.name == "adaptive-optimal" || entry.name == own_name;
+    const bool scalar = entry.name == own_name;
     for (const char* plant : {"paper-table1", "inteco-manual"}) {
       Case c{settings_of(plant), {}};
       c.settings.control.controller = entry.name;
@@ -259,9 +284,6 @@ TEST_CASE("adaptive-peak has the bits of simulate with any gains, rates and jump
   const std::vector<config::Settings> plants{settings_of("paper-table1"), settings_of("inteco-manual")};
   std::mt19937_64 generator(20261123);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  const auto scaled = [&](double& value, double most) {
-    value *= std::exp(std::log(most) * (2.0 * uniform(generator) - 1.0));
-  };
   std::vector<Case> cases;
   for (int i = 0; i < 2000; ++i) {
     Case c{plants[generator() % plants.size()], {}};
@@ -271,7 +293,7 @@ TEST_CASE("adaptive-peak has the bits of simulate with any gains, rates and jump
          {&o.ks0, &o.ks1, &o.lag_gain_per_s, &o.slip_rate_per_s, &o.search_rad_s, &o.peak.peak_force0_N,
           &o.peak.force_drift_per_s, &o.peak.slip_drift_per_s, &o.peak.shape_drift_per_s, &o.peak.force_noise_N2_s,
           &o.peak.jump_level, &o.peak.jump_hold_s, &o.observer.force_rate_N2_s})
-      scaled(*value, 3.0);
+      scale(generator, *value, 3.0);
     o.search_part *= 2.0 * uniform(generator);
     o.peak.peak_slip0 = o.slip_min + (o.slip_max - o.slip_min) * uniform(generator);
     // Few rates, so that there are packs in which the runs have jumps at different times.
@@ -283,24 +305,44 @@ TEST_CASE("adaptive-peak has the bits of simulate with any gains, rates and jump
     draw_conditions(generator, c.job.plant);
     cases.push_back(std::move(c));
   }
-  BatchCounts none;
-  const std::vector<Outcome> alone = [&] {
-    const Lanes lanes("none");
-    return batch(cases, 2, none);
-  }();
-  for (const char* set : sets()) {
-    const Lanes lanes(set);
-    BatchCounts counts;
-    const std::vector<Outcome> outcomes = batch(cases, 2, counts);
-    INFO(set << ": " << counts.lanes << " in lanes, " << counts.disturbed << " disturbed, " << counts.scalar
-             << " scalar");
-    CHECK(counts.lanes > cases.size() / 2);
-    for (std::size_t i = 0; i < cases.size(); ++i) {
-      INFO(i << ", seed " << cases[i].job.seed);
-      REQUIRE(outcomes[i].refusal == alone[i].refusal);
-      REQUIRE(same_bits(outcomes[i].run, alone[i].run));
-    }
+  require_bits_of_simulate(cases, 0);
+}
+
+TEST_CASE("adaptive-optimal has the bits of simulate with any gains, encoders, rates and jumps of friction") {
+  const std::vector<config::Settings> plants{settings_of("paper-table1"), settings_of("inteco-manual")};
+  std::mt19937_64 generator(20261126);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<Case> cases;
+  for (int i = 0; i < 1200; ++i) {
+    Case c{plants[generator() % plants.size()], {}};
+    config::Settings& s = c.settings;
+    s.control.controller = "adaptive-optimal";
+    auto& o = s.control.adaptive_optimal;
+    auto& b = o.bank;
+    for (double* value :
+         {&o.slip_gain_per_s, &o.slip_gain_runaway, &o.torque_gain_per_s, &o.play_Nm, &o.bold_slip, &o.runaway,
+          &o.model_error_per_s, &o.search_rad_s, &o.slip_rate_per_s, &o.observer.force_rate_N2_s})
+      scale(generator, *value, 2.5);
+    for (double* value : {&b.force_noise_N2_s, &b.timing_error_s, &b.start_s, &b.slip0, &b.level0_N, &b.share_per_s,
+                          &b.past_peak_cost, &b.jump_share, &b.jump_hold_s, &b.jump_spread, &b.jump_after_s})
+      scale(generator, *value, 2.5);
+    o.search_part *= 2.0 * uniform(generator);
+    if (generator() % 2 == 0) b.last_peak_slip = 0.02 + 0.23 * uniform(generator);
+    // Few rates, so that there are packs in which the runs have jumps at different times.
+    constexpr double rates_Hz[]{500.0, 1000.0, 1490.0};
+    s.control.rate_Hz = rates_Hz[generator() % std::size(rates_Hz)];
+    s.plant.rig.encoder_counts_per_rev = s.model.encoder_counts_per_rev = 1024 << (generator() % 3);
+    s.experiment.start_speed_rad_s = 60.0 + 140.0 * uniform(generator);
+    c.job.plant = perturbed(s.plant, draw(Variation::standard(), generator(), 0));
+    c.job.plant.ideal_actuator = s.plant.ideal_actuator = generator() % 8 == 0;
+    c.job.plant.ideal_sensors = generator() % 8 == 0;
+    c.job.seed = generator();
+    draw_conditions(generator, c.job.plant);
+    cases.push_back(std::move(c));
   }
+  // Twice as fast, the law learns in every second cycle, and has no lanes.
+  for (int i = 0; i < 10; ++i) cases[static_cast<std::size_t>(i)].settings.control.rate_Hz = 2000.0;
+  require_bits_of_simulate(cases, 10);
 }
 
 TEST_CASE("what becomes of a run does not depend on threads, order and number of runs") {
