@@ -43,7 +43,7 @@ BLOCKS = (1, 1, 1, 1, 2, 2, 2, 3, 3, 4)
 STEPS = sum(BLOCKS)
 BLOCK_OF = np.repeat(np.arange(len(BLOCKS)), BLOCKS)
 PEAKS, SHAPES = 0.02 * (0.25 / 0.02) ** (np.arange(8) / 7), np.linspace(1.15, 1.9, 3)  #: of the bank
-BANK_FROM_END = 410  #: words; behind it come what the bank tells and the law's own numbers
+BANK_FROM_END = 338  #: words; behind it come what the bank tells and the law's own numbers
 SIZES = (4, 8, 16)  #: numbers of scenarios that there is code for
 SEEN_S = 0.02  #: by then the force has shown what the slip does
 ROUND_NM, ROUND_M_S = 0.05, 0.02
@@ -71,11 +71,11 @@ class Posterior:
 
     def __init__(self, law, output):
         words = np.frombuffer(law.state_bytes())
-        members = words[-BANK_FROM_END:-BANK_FROM_END + 384].reshape(3, 16, 8)
-        theta, zero, variance, weight = members[:, 4], members[:, 5], members[:, 6], members[:, 9]
+        members = words[-BANK_FROM_END:-BANK_FROM_END + 312].reshape(3, 13, 8)
+        theta, zero, variance, weight = members[:, 1], members[:, 2], members[:, 3], members[:, 6]
         self.missing_Nm = float(words[-9])
         if not (abs(weight.sum() - 1.0) < 1e-6 and abs((weight * zero).sum() - output.signals[1]) < 1e-9
-                and np.allclose(members[:, 1], PEAKS, rtol=1e-9) and words[-8] == output.brake_torque_Nm):
+                and abs((weight * theta).sum() - output.theta_est_N) < 1e-6 and words[-8] == output.brake_torque_Nm):
             raise ValueError('the state of adaptive-optimal is laid out in another way than research/nmpc.py reads it')
         self.weight = weight.sum(0)
         shares = weight / np.maximum(self.weight, 1e-300)
