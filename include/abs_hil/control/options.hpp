@@ -77,7 +77,7 @@ struct BrakingStiffnessOptions {
   ABS_HIL_OPTIONS(BrakingStiffnessOptions);
   ABS_HIL_OPTION(double, memory_s, 0.021, .unit = "s", .meaning = "memory of the slope of force over slip",
                  .range = rig::between(0.002, 10));
-  ABS_HIL_OPTION(double, slip_noise, 0.0026, .meaning = "spread of the slip that tells nothing of the slope",
+  ABS_HIL_OPTION(double, slip_noise, 0.002, .meaning = "spread of the slip that tells nothing of the slope",
                  .range = rig::between(1e-6, 0.1));
   ABS_HIL_OPTION(double, target, 0.0296, .meaning = "relative growth of force per relative growth of slip to stay at",
                  .range = rig::between(-1, 1));
@@ -85,7 +85,7 @@ struct BrakingStiffnessOptions {
                  .range = rig::positive(1000));
   ABS_HIL_OPTION(double, slip_min, 0.01, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_start, 0.0659, .meaning = "slip reference at the start of braking",
+  ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, search_part, 0.169, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
