@@ -43,7 +43,7 @@ BLOCKS = (1, 1, 1, 1, 2, 2, 2, 3, 3, 4)
 STEPS = sum(BLOCKS)
 BLOCK_OF = np.repeat(np.arange(len(BLOCKS)), BLOCKS)
 PEAKS, SHAPES = 0.02 * (0.25 / 0.02) ** (np.arange(8) / 7), np.linspace(1.15, 1.9, 3)  #: of the bank
-BANK_FROM_END = 338  #: words; behind it come what the bank tells and the law's own numbers
+BANK_FROM_END = 290  #: words; behind it come what the bank tells and the law's own numbers
 SIZES = (4, 8, 16)  #: numbers of scenarios that there is code for
 SEEN_S = 0.02  #: by then the force has shown what the slip does
 ROUND_NM, ROUND_M_S = 0.05, 0.02
@@ -58,8 +58,7 @@ OWN = ('weight', 'theta', 'peak', 'shape', 'zero')
 
 @dataclasses.dataclass(frozen=True)
 class Tuning:
-    """The free numbers, chosen by hand on the cases and the score of `nmpc_table.py --tune`, of another seed than the judged ones.
-    There half a point of the score is chance."""
+    """The free numbers, chosen by `nmpc_table.py --tune` on cases of another seed than the judged ones."""
     horizon_s: float = 0.15
     movement: float = 1e-3  #: m for a newton metre
     rest_s: float = 0.05
@@ -72,8 +71,8 @@ class Posterior:
 
     def __init__(self, law, output):
         words = np.frombuffer(law.state_bytes())
-        members = words[-BANK_FROM_END:-BANK_FROM_END + 312].reshape(3, 13, 8)
-        theta, zero, variance, weight = members[:, 1], members[:, 2], members[:, 3], members[:, 6]
+        members = words[-BANK_FROM_END:-BANK_FROM_END + 264].reshape(3, 11, 8)
+        theta, zero, variance, weight = members[:, 0], members[:, 1], members[:, 2], members[:, 5]
         self.missing_Nm = float(words[-9])
         if not (abs(weight.sum() - 1.0) < 1e-6 and abs((weight * zero).sum() - output.signals[1]) < 1e-9
                 and abs((weight * theta).sum() - output.theta_est_N) < 1e-6 and words[-8] == output.brake_torque_Nm):

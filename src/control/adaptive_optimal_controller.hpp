@@ -113,6 +113,10 @@ class AdaptiveOptimalLaw {
   BasicLowerWheelForce<S> force_{};
   BasicDelayedSpeeds<S> speeds_{};
   S learns_every_{1.0};  ///< cycles
+  S step_s_{0.0};        ///< time of the last step of learning, and what of its distance the model's error covers then
+  S error_covered_{0.0};
+  S cycle_s_{0.0};  ///< time of the last cycle, and the largest factor of the reference in it
+  S largest_rise_{1.0};
   Bank bank_{};
   S reference_{0.0};       ///< slip of the peak, without search and zero
   S model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it

@@ -69,8 +69,11 @@ void AdaptiveOptimalLaw<S>::learn(const BasicSlipInput<S>& input, const S& slip)
   const paper::Reading<S> same{.omega1 = S(0.0), .omega2 = S(0.0), .lambda_ref = S(0.0), .phi = S(1.0)};
   const S missing_Nm =
       laws_.T_b(laws_.k(same) * (observer_.force_N() - bank_.late_force_N())) - observer_.brake_error_Nm();
-  const S covered = -rig::exponential_less_one(S(-gains_.model_error_per_s * step.time_s));
-  model_error_Nm_ += covered * (missing_Nm - model_error_Nm_);
+  if (rig::any(step.time_s != step_s_)) {
+    step_s_ = step.time_s;
+    error_covered_ = -rig::exponential_less_one(S(-gains_.model_error_per_s * step_s_));
+  }
+  model_error_Nm_ += error_covered_ * (missing_Nm - model_error_Nm_);
 }
 
 /// If the slip runs away within the time that the brake takes to act, the reference must not be past the peak, whatever
@@ -84,8 +87,12 @@ S AdaptiveOptimalLaw<S>::peak_factor() const noexcept {
 template <class S>
 S AdaptiveOptimalLaw<S>::next_reference(const S& dt_s) noexcept {
   const S target = rig::clamped(S(peak_factor() * bank_.peak_slip()), gains_.slip_min, gains_.slip_max);
+  if (rig::any(dt_s != cycle_s_)) {
+    cycle_s_ = dt_s;
+    largest_rise_ = rig::exponential(S(gains_.slip_rate_per_s * dt_s));
+  }
   // A peak that turns out to be near must not be passed: only a rise takes time.
-  reference_ = rig::smaller(target, reference_ * rig::exponential(S(gains_.slip_rate_per_s * dt_s)));
+  reference_ = rig::smaller(target, reference_ * largest_rise_);
   search_rad_ = within_half_turn_rad(S(search_rad_ + gains_.search_rad_s * dt_s));
   const S search = gains_.search_part * rig::sine(search_rad_);
   return reference_ * (1.0 + search) - bank_.slip_zero();

@@ -58,7 +58,8 @@ BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions& o, double rat
     throw std::invalid_argument("the friction bank needs a control rate and a delay of the quick force > 0");
   }
   double sum = 0.0, last_sum = 0.0;
-  Row prior(0.0), last(0.0);
+  Row& prior = prior_;
+  Row last(0.0);
   for (std::size_t j = 0; j < peaks; ++j) {
     set(prior, j, belief(friction_curves::peak[j], o.slip0, o.slip_spread));
     if (o.last_peak_slip > 0.0) set(last, j, belief(friction_curves::peak[j], o.last_peak_slip, o.last_peak_spread));
@@ -71,7 +72,6 @@ BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions& o, double rat
   const double part = o.last_peak_part;
   prior = prior / Row(sum);
   if (last_sum > 0.0) prior = (1.0 - part) * prior + last * (part / last_sum);
-  for (Members& m : bank_) m.prior = prior;
   reset({.car_speed_m_s = 1.0});
 }
 
@@ -86,10 +86,10 @@ void BasicFrictionBank<S>::reset(const Start& start) noexcept
   for (Members& m : bank_) {
     m.theta_N = options_.level0_N;
     m.zero = zero;
-    m.covariance = m.now = 0.0;
+    m.covariance = 0.0;
     m.theta_variance = square(options_.level_spread_N);
     m.zero_variance = square(spread);
-    m.weight = m.prior;
+    m.weight = prior_;
     m.phi = {};
   }
   late_slip_.settle(start.slip);

@@ -29,7 +29,6 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
-#include <memory>
 #include <type_traits>
 
 #include "abs_hil/control/options.hpp"
@@ -133,12 +132,10 @@ class BasicFrictionBank {
   };
   /// Those of one shape.
   struct Members {
-    Words prior{};
     Words theta_N{}, zero{};
     Words theta_variance{}, covariance{}, zero_variance{};
     Words weight{};
-    std::conditional_t<alone, ForceDelay<Row>, LaneDelay> phi{};
-    Words now{};  ///< the curve at the last reading
+    std::conditional_t<alone, ForceDelay<Row>, LaneDelay> phi{};  ///< `last`: at the last reading
   };
   /// What all members compare their curves with in a cycle.
   struct Look {
@@ -184,7 +181,7 @@ class BasicFrictionBank {
                                                        [[maybe_unused]] std::size_t row) noexcept {
     if constexpr (alone) {
       Row r;
-      const auto* first = std::assume_aligned<sizeof(r.v[0])>(of_peaks.data());
+      const auto* first = static_cast<const double*>(__builtin_assume_aligned(of_peaks.data(), sizeof(r.v[0])));
       for (std::size_t i = 0; i < std::size(r.v); ++i) std::memcpy(&r.v[i], first + 2 * i, sizeof(r.v[i]));
       return r;
     } else {
@@ -214,7 +211,7 @@ class BasicFrictionBank {
   }
 
   template <class Condition>
-  static void learn(const Look& look, Condition learns, Condition compares, std::size_t shape, Members& m) noexcept;
+  void learn(const Look& look, Condition learns, Condition compares, std::size_t shape, Members& m) noexcept;
   template <class Condition>
   void follow_jump(const Condition& where, const S& dt_s, const S& residual_N) noexcept;
   void watch_for_jumps(const Data& data) noexcept;
@@ -223,6 +220,9 @@ class BasicFrictionBank {
   Options options_{};
   S rate_Hz_{0.0};
   S quick_delay_s_{0.0};
+  S last_dt_s_{0.0};
+  S quick_covered_{0.0};  ///< of its distance, by the delay of the quick force in `last_dt_s_`
+  Words prior_{};         ///< the same for all shapes
   std::array<Members, shapes> bank_{};
   ForceDelay<S> late_slip_{};
   S time_s_{0.0};

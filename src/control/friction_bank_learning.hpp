@@ -74,7 +74,11 @@ void BasicFrictionBank<S>::learn(const Data& data) noexcept {
     learn(look, learns, compares, shape, bank_[shape]);
   }
   summarise(data.runaway_per_N);
-  late_force_N_ += -rig::exponential_less_one(S(-data.dt_s / quick_delay_s_)) * (force_N_ - late_force_N_);
+  if (rig::any(data.dt_s != last_dt_s_)) {
+    last_dt_s_ = data.dt_s;
+    quick_covered_ = -rig::exponential_less_one(S(-data.dt_s / quick_delay_s_));
+  }
+  late_force_N_ += quick_covered_ * (force_N_ - late_force_N_);
 }
 
 template <class S>
@@ -87,8 +91,8 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
   for (std::size_t row = 0; row < rows_a_shape; ++row) {
     const Row knee = numbers(friction_curves::derived.knee[shape], row);
     const Row& theta_N = row_of(m.theta_N, row);
-    Row& now = row_of(m.now, row);
-    now = friction_curves::value(shape, knee, Row(look.slip + row_of(m.zero, row)));
+    const Row now = friction_curves::value(shape, knee, Row(look.slip + row_of(m.zero, row)));
+    by_slip[row] = friction_curves::slope(shape, knee, Row(look.late_slip + row_of(m.zero, row)));
     auto&& late = delay_of(m, row);
     delayed[row] = late(look.covered, now);
     keep(m, row, late);
@@ -99,16 +103,11 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
   }
   if (!rig::any(learns)) return;
   for (std::size_t row = 0; row < rows_a_shape; ++row) {
-    const Row knee = numbers(friction_curves::derived.knee[shape], row);
-    by_slip[row] = friction_curves::slope(shape, knee, Row(look.late_slip + row_of(m.zero, row)));
-  }
-  for (std::size_t row = 0; row < rows_a_shape; ++row) {
     Row& theta_N = row_of(m.theta_N, row);
     Row& zero = row_of(m.zero, row);
     Row& theta_variance = row_of(m.theta_variance, row);
     Row& covariance = row_of(m.covariance, row);
     Row& zero_variance = row_of(m.zero_variance, row);
-    Row& now = row_of(m.now, row);
     // The gradient of the force that the member expects, by theta and by the zero.
     const Row phi = delayed[row] - by_slip[row] * look.slip_offset;
     const Row by_zero = theta_N * by_slip[row];
@@ -122,7 +121,7 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
     if (rig::any(compares)) {
       Row& weight = row_of(m.weight, row);
       const Row log_likelihood = rig::larger(Row(log_likelihood_min), square(residual) * (-0.5 * per));
-      const Row seen = (weight + look.back * row_of(m.prior, row)) * likelihood(log_likelihood) *
+      const Row seen = (weight + look.back * row_of(prior_, row)) * likelihood(log_likelihood) *
                        rig::square_root(Row(look.noise_N2 * per));
       weight = rig::select(compares, seen, weight);
     }
@@ -133,7 +132,6 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
     auto&& late = delay_of(m, row);
     late.shift(shift);
     keep(m, row, late);
-    now = now + shift;
     zero = moved;
     // Rounding must not make the covariance indefinite.
     theta_variance = rig::select(
@@ -217,7 +215,7 @@ void BasicFrictionBank<S>::summarise(const S& runaway_per_N) noexcept {
       runaway = runaway + part * runs_away;
       zero = zero + part * row_of(m.zero, row);
       theta = theta + height;
-      force = force + height * row_of(m.now, row);
+      force = force + height * row_of(m.phi.last, row);
     }
     weights.add(row, weight);
     slips.add(row, slip);
