@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
-"""usage: drawn_table.py KEPT [--combined | --warm | --sentences]
+"""usage: drawn_table.py KEPT [--combined | --sentences]
 
 Brakings that docs/theory-beyond.md draws besides the benchmark: 200 cases of a seed under five laws. Prints the table "drawn";
---sentences prints the sentence on the worst of them, --combined that on two draws of cases with several things wrong at once,
---warm that on three such draws after a stop. KEPT is the folder of the bounds drawn.json and combined.json, which
-research/benchmark_bounds.py computes. Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
+--sentences prints the sentence on the worst of them, --combined that on draws of cases with several things wrong at once, cold
+and after a stop. KEPT is the folder of the bounds drawn.json and combined.json, which are computed if they are not there.
+Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import pathlib
 import sys
 
 import numpy as np
+from search_braking_gains import COMBINED_BOUNDS, COMBINED_COUNT, COMBINED_SEEDS
 
 from abs_hil.benchmark import Entry, bounds, cases, run
 
 SEED, COUNT = 27182, 200
-COMBINED_SEEDS, COMBINED_COUNT, COMBINED_PHASES = (20261126, 20261127), 110, 6
-#: the last one chose nothing of the law
-WARM_SEEDS = (*COMBINED_SEEDS, 20261128)
+#: a draw of combined cases that chose nothing of the law; each case with so many positions of the wheels within a count
+HONEST_SEED, PHASES = 20261129, 6
 OWN = 'adaptive-optimal'
 #: row -> controller, settings
 ROWS = {f'`{OWN}`': (OWN, {}), f'`{OWN}` at 5 kHz': (OWN, {'control.rate_Hz': 5000.0}), '`adaptive-peak`': ('adaptive-peak', {}),
@@ -25,12 +25,6 @@ ROWS = {f'`{OWN}`': (OWN, {}), f'`{OWN}` at 5 kHz': (OWN, {'control.rate_Hz': 50
 
 def drawn_cases():
     return cases.drawn(SEED, COUNT)
-
-
-def combined_cases():
-    """Two draws, and those of the benchmark."""
-    return [*(case for seed in COMBINED_SEEDS for case in cases.combined(seed, COMBINED_COUNT)),
-            *(case for case in cases.whole_set() if case.group == 'combined')]
 
 
 def figures(name, settings, chosen, kept, seeds=cases.SEEDS, warm=False):
@@ -63,24 +57,24 @@ def sentences(kept):
 
 
 def combined(kept):
-    _, excess, variation, _ = figures(OWN, {}, combined_cases(), kept, tuple(range(1, COMBINED_PHASES + 1)))
-    return (f"seeds each: mean {excess.mean():.1f} %, 90 % {np.quantile(excess, 0.9):.1f} %, worst {excess.max():.1f} %, "
-            f'torque variation at most {variation.max():.0f} N m.')
+    """The draws that the gains were searched on, and the honest one: a figure for each, in this order."""
+    phases = tuple(range(1, PHASES + 1))
 
-
-def warm(kept):
     def of_draws(warm):
-        draws = [figures(OWN, {}, cases.combined(seed, COMBINED_COUNT), kept, warm=warm)[1] for seed in WARM_SEEDS]
-        return [', '.join(f'{value:.1f}' for value in values) for values in
-                ([draw.mean() for draw in draws], [np.quantile(draw, 0.9) for draw in draws], [draw.max() for draw in draws])]
-    (mean, most, worst), (warm_mean, warm_most, warm_worst) = of_draws(False), of_draws(True)
-    return (f'seed {WARM_SEEDS[-1]}, two seeds each: mean {mean} %, 90 % {most} %, worst {worst} %; after a stop {warm_mean}, '
-            f'{warm_most} and {warm_worst} %.')
+        draws = [figures(OWN, {}, cases.combined(seed, COMBINED_COUNT), file, phases, warm)[1:3]
+                 for seed, file in [*((seed, COMBINED_BOUNDS) for seed in COMBINED_SEEDS), (HONEST_SEED, kept)]]
+        excess = [draw for draw, _ in draws]
+        parts = ([draw.mean() for draw in excess], [np.quantile(draw, 0.9) for draw in excess], [draw.max() for draw in excess])
+        return [', '.join(f'{value:.1f}' for value in values) for values in parts], max(most.max() for _, most in draws)
+    (mean, most, worst), variation_Nm = of_draws(False)
+    (warm_mean, warm_most, warm_worst), _ = of_draws(True)
+    return (f'mean {mean} %, 90 % {most} %, worst {worst} %, torque variation at most {variation_Nm:.0f} N m; after a stop '
+            f'{warm_mean}, {warm_most} and {warm_worst} %.')
 
 
 def main():
     options = {(): (table, 'drawn.json'), ('--sentences',): (sentences, 'drawn.json'),
-               ('--combined',): (combined, 'combined.json'), ('--warm',): (warm, 'combined.json')}
+               ('--combined',): (combined, 'combined.json')}
     if len(sys.argv) < 2 or tuple(sys.argv[2:]) not in options:
         print(__doc__, file=sys.stderr)
         return 2

@@ -58,7 +58,8 @@ OWN = ('weight', 'theta', 'peak', 'shape', 'zero')
 
 @dataclasses.dataclass(frozen=True)
 class Tuning:
-    """The free numbers, chosen by `nmpc_table.py --tune` on cases of another seed than the judged ones."""
+    """The free numbers, chosen by hand on the cases and the score of `nmpc_table.py --tune`, of another seed than the judged ones.
+    There half a point of the score is chance."""
     horizon_s: float = 0.15
     movement: float = 1e-3  #: m for a newton metre
     rest_s: float = 0.05

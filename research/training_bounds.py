@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """usage: training_bounds.py BUILD
 
-Computes the causal optimum (python -m abs_hil.optimum) of each run of the training study, config/training/braking.toml, and
-keeps it in config/training/bounds.json: research/search_braking_gains.py measures distances against these. Goes on where it was
-interrupted, and takes some seconds a run. Needs casadi and the package abs_hil of a build
-(PYTHONPATH=build/release/share/abs_hil/python).
+Computes the causal optimum (python -m abs_hil.optimum) of each run of the training study, config/training/braking.toml, and of
+the draws of combined cases, and keeps them in config/training/bounds.json and combined-bounds.json:
+research/search_braking_gains.py measures distances against these. Goes on where it was interrupted, and takes some seconds
+a run. Needs casadi and the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import json
 import os
@@ -14,7 +14,17 @@ import tempfile
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
-from search_braking_gains import BOUNDS, PROFILE, ROOT, bound_key, study_rows, stored_bounds  # noqa: E402
+from benchmark_bounds import computed  # noqa: E402
+from search_braking_gains import (  # noqa: E402
+    BOUNDS,
+    COMBINED_BOUNDS,
+    PROFILE,
+    ROOT,
+    bound_key,
+    combined_cases,
+    stored_bounds,
+    study_rows,
+)
 
 from abs_hil import Plant  # noqa: E402
 from abs_hil.optimum import NoOptimum, optimum  # noqa: E402
@@ -55,6 +65,7 @@ def main():
             print(f'{number + 1} of {len(rows)}', file=sys.stderr, flush=True)
             kept = bounds if number + 1 == len(rows) else {**known, **bounds}
             BOUNDS.write_text(json.dumps(kept, indent=0) + '\n', encoding='utf-8')
+    computed(combined_cases(), COMBINED_BOUNDS)
     return 0
 
 

@@ -70,7 +70,7 @@ struct MixedSlipDecelerationOptions {
   ABS_HIL_OPTIONS(MixedSlipDecelerationOptions);
   ABS_HIL_OPTION(double, weight, 0.0137, .meaning = "weight of the wheel's deceleration in g beside the slip",
                  .range = rig::from_zero(10));
-  ABS_HIL_OPTION(double, target, 0.13, .meaning = "wanted sum of slip and weighted deceleration",
+  ABS_HIL_OPTION(double, target, 0.1, .meaning = "wanted sum of slip and weighted deceleration",
                  .range = rig::positive(10));
   ABS_HIL_OPTION(double, kp_Nm, 78.0, .unit = "N m", .meaning = "proportional gain on that sum",
                  .range = rig::positive(1e4));

@@ -77,7 +77,7 @@ struct BrakingStiffnessOptions {
   ABS_HIL_OPTIONS(BrakingStiffnessOptions);
   ABS_HIL_OPTION(double, memory_s, 0.021, .unit = "s", .meaning = "memory of the slope of force over slip",
                  .range = rig::between(0.002, 10));
-  ABS_HIL_OPTION(double, slip_noise, 0.0026, .meaning = "spread of the slip that tells nothing of the slope",
+  ABS_HIL_OPTION(double, slip_noise, 0.002, .meaning = "spread of the slip that tells nothing of the slope",
                  .range = rig::between(1e-6, 0.1));
   ABS_HIL_OPTION(double, target, 0.0296, .meaning = "relative growth of force per relative growth of slip to stay at",
                  .range = rig::between(-1, 1));
@@ -85,7 +85,7 @@ struct BrakingStiffnessOptions {
                  .range = rig::positive(1000));
   ABS_HIL_OPTION(double, slip_min, 0.01, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_start, 0.0659, .meaning = "slip reference at the start of braking",
+  ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, search_part, 0.169, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
@@ -150,19 +150,19 @@ struct FrictionBankOptions {
   ABS_HIL_OPTIONS(FrictionBankOptions);
   ABS_HIL_OPTION(double, force_bandwidth_rad_s, 165.0, .unit = "rad/s",
                  .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000));
-  ABS_HIL_OPTION(double, force_noise_N2_s, 0.00409, .unit = "N^2 s",
+  ABS_HIL_OPTION(double, force_noise_N2_s, 0.00356, .unit = "N^2 s",
                  .meaning = "intensity of that force's noise, with 4096 counts a turn", .range = rig::positive(100));
-  ABS_HIL_OPTION(double, force_error, 0.01, .meaning = "part of the force that the curve need not explain",
+  ABS_HIL_OPTION(double, force_error, 0.0087, .meaning = "part of the force that the curve need not explain",
                  .range = rig::positive(1));
   ABS_HIL_OPTION(double, timing_error_s, 0.0005, .unit = "s", .meaning = "delay between slip and force left unknown",
                  .range = rig::from_zero(0.1));
   ABS_HIL_OPTION(double, slip_noise_m_s, 0.00154, .unit = "m/s", .meaning = "error of the difference of both speeds",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, start_s, 0.012, .unit = "s", .meaning = "time at the start in which nothing is learnt",
+  ABS_HIL_OPTION(double, start_s, 0.0096, .unit = "s", .meaning = "time at the start in which nothing is learnt",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, slip0, 0.078, .meaning = "median of the peak's slip before braking",
+  ABS_HIL_OPTION(double, slip0, 0.0545, .meaning = "median of the peak's slip before braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_spread, 1.29, .meaning = "standard deviation of the logarithm of the peak's slip",
+  ABS_HIL_OPTION(double, slip_spread, 1.28, .meaning = "standard deviation of the logarithm of the peak's slip",
                  .range = rig::between(0.05, 5));
   ABS_HIL_OPTION(double, last_peak_slip, 0.0,
                  .meaning = "slip of the peak that the last braking on this rig has left; 0: there was none",
@@ -174,10 +174,10 @@ struct FrictionBankOptions {
                  .range = rig::from_zero_below(1));
   ABS_HIL_OPTION(double, level0_N, 12.5, .unit = "N", .meaning = "first guess of the peak's force",
                  .range = rig::positive(500));
-  ABS_HIL_OPTION(double, level_spread_N, 24.8, .unit = "N", .meaning = "standard deviation of this guess",
+  ABS_HIL_OPTION(double, level_spread_N, 22.0, .unit = "N", .meaning = "standard deviation of this guess",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(
-      double, zero_error_m_s, 0.0195, .unit = "m/s",
+      double, zero_error_m_s, 0.009, .unit = "m/s",
       .meaning = "error of the difference of both speeds that is read as braking begins, with 4096 counts a turn",
       .range = rig::between(1e-6, 1));
   ABS_HIL_OPTION(double, zero_error_per_N, 0.002, .unit = "1/N",
@@ -186,15 +186,15 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, past_peak_cost, 1.0,
                  .meaning = "what a peak that is passed costs more, times the runaway of the slip behind it",
                  .range = rig::from_zero(1e4));
-  ABS_HIL_OPTION(double, level_drift_per_s, 0.005, .unit = "1/s",
+  ABS_HIL_OPTION(double, level_drift_per_s, 0.00625, .unit = "1/s",
                  .meaning = "variance gained per second by the logarithm of the peak's force",
                  .range = rig::from_zero(100));
   ABS_HIL_OPTION(double, level_drift_unexplained_per_s, 15.0, .unit = "1/s",
                  .meaning = "what the square of the unexplained part of the peak's force adds to that",
                  .range = rig::from_zero(1e4));
-  ABS_HIL_OPTION(double, zero_drift_per_s, 0.0001, .unit = "1/s",
+  ABS_HIL_OPTION(double, zero_drift_per_s, 0.000125, .unit = "1/s",
                  .meaning = "variance gained per second by the slip read at no force", .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, share_per_s, 0.0118, .unit = "1/s",
+  ABS_HIL_OPTION(double, share_per_s, 0.0147, .unit = "1/s",
                  .meaning = "part of the weights that returns to the curves known before braking, per second",
                  .range = rig::between(1e-9, 100));
   ABS_HIL_OPTION(double, jump_share, 0.143, .meaning = "unexplained part of the peak's force that is a friction jump",
@@ -205,9 +205,9 @@ struct FrictionBankOptions {
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, jump_hold_s, 0.0308, .unit = "s",
                  .meaning = "time after a jump in which only the level is learnt", .range = rig::positive(1));
-  ABS_HIL_OPTION(double, jump_time_constant_s, 0.0023, .unit = "s",
+  ABS_HIL_OPTION(double, jump_time_constant_s, 0.00244, .unit = "s",
                  .meaning = "time constant with which the level is learnt then", .range = rig::positive(1));
-  ABS_HIL_OPTION(double, jump_spread, 0.169, .meaning = "relative standard deviation of the level after that",
+  ABS_HIL_OPTION(double, jump_spread, 0.108, .meaning = "relative standard deviation of the level after that",
                  .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, jump_after_s, 0.1, .unit = "s",
                  .meaning = "time at the start in which no friction jump is looked for", .range = rig::from_zero(10));
@@ -218,30 +218,30 @@ struct AdaptiveOptimalOptions {
   ABS_HIL_OPTIONS(AdaptiveOptimalOptions);
   ABS_HIL_OPTION(double, slip_gain_per_s, 58.0, .unit = "1/s", .meaning = "decay of a large slip velocity error",
                  .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, slip_gain_near_per_s, 12.1, .unit = "1/s", .meaning = "decay of a small one",
+  ABS_HIL_OPTION(double, slip_gain_near_per_s, 13.9, .unit = "1/s", .meaning = "decay of a small one",
                  .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, slip_gain_runaway, 8.0,
+  ABS_HIL_OPTION(double, slip_gain_runaway, 6.96,
                  .meaning = "what is added to that, over the rate at which the slip runs away past the peak",
                  .range = rig::from_zero(1e4));
   ABS_HIL_OPTION(double, slip_near_m_s, 0.07, .unit = "m/s", .meaning = "error at which the gain is half way between",
                  .range = rig::positive(10));
-  ABS_HIL_OPTION(double, torque_gain_per_s, 150.0, .unit = "1/s", .meaning = "decay of a large torque error",
+  ABS_HIL_OPTION(double, torque_gain_per_s, 165.0, .unit = "1/s", .meaning = "decay of a large torque error",
                  .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, torque_gain_near_per_s, 27.3, .unit = "1/s", .meaning = "decay of a small one",
+  ABS_HIL_OPTION(double, torque_gain_near_per_s, 21.8, .unit = "1/s", .meaning = "decay of a small one",
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, torque_near_Nm, 0.54, .unit = "N m", .meaning = "error at which the gain is half way between",
                  .range = rig::positive(100));
-  ABS_HIL_OPTION(double, play_Nm, 0.178, .unit = "N m", .meaning = "change of the torque below which the brake rests",
+  ABS_HIL_OPTION(double, play_Nm, 0.278, .unit = "N m", .meaning = "change of the torque below which the brake rests",
                  .range = rig::from_zero(10));
-  ABS_HIL_OPTION(double, authority, 0.48, .meaning = "part of the fastest approach from too little slip that is used",
+  ABS_HIL_OPTION(double, authority, 0.938, .meaning = "part of the fastest approach from too little slip that is used",
                  .range = rig::between(0.01, 1));
   ABS_HIL_OPTION(double, authority_past_peak, 1.0, .meaning = "the same where the force falls as the slip grows",
                  .range = rig::between(0.01, 1));
-  ABS_HIL_OPTION(double, bold_slip, 1.23, .meaning = "slip that an unknown peak may cost at the start",
+  ABS_HIL_OPTION(double, bold_slip, 0.4, .meaning = "slip that an unknown peak may cost at the start",
                  .range = rig::positive(100));
-  ABS_HIL_OPTION(double, model_error_per_s, 35.0, .unit = "1/s",
+  ABS_HIL_OPTION(double, model_error_per_s, 50.0, .unit = "1/s",
                  .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, peak_factor, 1.14, .meaning = "slip reference over the estimated slip of the peak",
+  ABS_HIL_OPTION(double, peak_factor, 1.17, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
   ABS_HIL_OPTION(
       double, runaway, 0.7,
@@ -249,16 +249,16 @@ struct AdaptiveOptimalOptions {
       .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
+  ABS_HIL_OPTION(double, slip_start, 0.0375, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_rate_per_s, 12.0, .unit = "1/s",
+  ABS_HIL_OPTION(double, slip_rate_per_s, 15.0, .unit = "1/s",
                  .meaning = "fastest rise of the logarithm of the slip reference", .range = rig::positive(1000));
   ABS_HIL_OPTION(double, search_part, 0.08, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
-  ABS_HIL_OPTION(double, search_rad_s, 28.0, .unit = "rad/s", .meaning = "frequency of the search",
+  ABS_HIL_OPTION(double, search_rad_s, 24.0, .unit = "rad/s", .meaning = "frequency of the search",
                  .range = rig::positive(1000));
   ABS_HIL_GROUP(FrictionBankOptions, bank, "", {});
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 5.0});
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 4.0});
 };
 
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
