@@ -80,7 +80,7 @@ def main():
         text = f'''| | measured here |
 |---|---|
 | CPU time of a task beside its runs: start, study, folder | {1e3 * start_s:.0f} ms |
-| CPU time of one run of `adaptive` on `paper-table1`, scalar | {1e3 * min(run for _, run in parted.values()):.1f} ms |
+| CPU time of one run of `adaptive` on `paper-table1`, in lanes | {1e3 * min(run for _, run in parted.values()):.1f} ms |
 | CPU time to write one more chunk | {1e3 * (many - few) / (20_000 / 50):.2f} ms |
 | a row, as text and in the results | {plain:.0f} and {packed:.0f} bytes |
 | memory of a study of 10,000 and of 100,000 runs | {ten_MB:.0f} and {many_MB:.0f} MB |
