@@ -64,7 +64,8 @@ BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions& o, double rat
     set(prior, j, belief(friction_curves::peak[j], o.slip0, o.slip_spread));
     if (o.last_peak_slip > 0.0) set(last, j, belief(friction_curves::peak[j], o.last_peak_slip, o.last_peak_spread));
   }
-  for (std::size_t i = 0; i < shapes * peaks; ++i) {
+  constexpr std::size_t members = peaks * shapes;
+  for (std::size_t i = 0; i < members; ++i) {
     sum += number(prior, i % peaks);
     last_sum += number(last, i % peaks);
   }
