@@ -16,9 +16,12 @@ using friction_curves::square;
 // high. Chosen on two draws of combined cases (docs/theory-beyond.md).
 constexpr double kept_part = 0.7;
 
-/// Of a peak at a slip whose logarithm is known to a standard deviation, not normalised.
+/// Of a peak at a slip whose logarithm is known to a standard deviation, not normalised. The bits of the C library's
+/// functions depend on the platform.
 double belief(double peak, double median, double spread) noexcept {
-  return std::exp(-0.5 * square(std::log(peak / median) / spread));
+  constexpr double least = -700.0;  // below, e^x is no number that the polynomial can give
+  const double x = -0.5 * square(rig::logarithm(peak / median) / spread);
+  return x > least ? rig::exponential(x) : 0.0;
 }
 
 void set(auto& row, std::size_t j, double value) noexcept { row.v[j / 2][j % 2] = value; }
@@ -82,7 +85,7 @@ void BasicFrictionBank<S>::reset(const Start& start) noexcept
 {
   using friction_bank::zero_max;
   const double zero = std::clamp(-start.slip, -zero_max, zero_max);
-  const double spread = std::hypot(options_.zero_error_m_s, start.swing_m_s) / start.car_speed_m_s +
+  const double spread = std::sqrt(square(options_.zero_error_m_s) + square(start.swing_m_s)) / start.car_speed_m_s +
                         options_.zero_error_per_N * std::abs(start.force_N);
   for (Members& m : bank_) {
     m.theta_N = options_.level0_N;
@@ -104,9 +107,9 @@ double BasicFrictionBank<S>::learnt_peak_slip() const noexcept
 {
   double mean = 0.0;
   for (const Members& m : bank_) {
-    for (std::size_t j = 0; j < peaks; ++j) mean += number(m.weight, j) * std::log(friction_curves::peak[j]);
+    for (std::size_t j = 0; j < peaks; ++j) mean += number(m.weight, j) * rig::logarithm(friction_curves::peak[j]);
   }
-  return kept_part * std::exp(mean);
+  return kept_part * rig::exponential(mean);
 }
 
 template class BasicFrictionBank<double>;
