@@ -16,7 +16,7 @@ from abs_hil.benchmark import Entry, bounds, cases, run
 
 SEED, COUNT = 27182, 200
 #: a draw of combined cases that chose nothing of the law; each case with so many positions of the wheels within a count
-HONEST_SEED, PHASES = 20261129, 6
+HELD_OUT_SEED, PHASES = 20261129, 6
 OWN = 'adaptive-optimal'
 #: row -> controller, settings
 ROWS = {f'`{OWN}`': (OWN, {}), f'`{OWN}` at 5 kHz': (OWN, {'control.rate_Hz': 5000.0}), '`adaptive-peak`': ('adaptive-peak', {}),
@@ -57,12 +57,12 @@ def sentences(kept):
 
 
 def combined(kept):
-    """The draws that the gains were searched on, and the honest one: a figure for each, in this order."""
+    """The draws that the gains were searched on, and the held-out one: a figure for each, in this order."""
     phases = tuple(range(1, PHASES + 1))
 
     def of_draws(warm):
         draws = [figures(OWN, {}, cases.combined(seed, COMBINED_COUNT), file, phases, warm)[1:3]
-                 for seed, file in [*((seed, COMBINED_BOUNDS) for seed in COMBINED_SEEDS), (HONEST_SEED, kept)]]
+                 for seed, file in [*((seed, COMBINED_BOUNDS) for seed in COMBINED_SEEDS), (HELD_OUT_SEED, kept)]]
         excess = [draw for draw, _ in draws]
         parts = ([draw.mean() for draw in excess], [np.quantile(draw, 0.9) for draw in excess], [draw.max() for draw in excess])
         return [', '.join(f'{value:.1f}' for value in values) for values in parts], max(most.max() for _, most in draws)

@@ -216,7 +216,9 @@ class Nmpc:
         self.shadow = abs_hil.Controller('adaptive-optimal', plant, values)
         rows = abs_hil.keys(plant=plant, set=values)
         self.rig = {name.partition('.')[2]: row['value'] for name, row in rows.items() if name.startswith('model.')}
-        self.every = max(1, round(period_s * rows['control.rate_Hz']['value']))
+        rate_Hz = rows['control.rate_Hz']['value']
+        self.every = max(1, round(period_s * rate_Hz))
+        self.period_s = self.every / rate_Hz
         self.tuning, self.solver = tuning, Solver(functions)
         self.solves = self.failures = 0
         self.solving_s = 0.0
@@ -255,7 +257,7 @@ class Nmpc:
         starts += [np.full(len(BLOCKS), level) for level in (holding, min(output.brake_torque_Nm, most))]
         if self.last is not None:
             middles = np.cumsum(BLOCKS) - 0.5 * np.array(BLOCKS)
-            later = self.every * 1e-3 / (tuning.horizon_s / STEPS)
+            later = self.period_s / (tuning.horizon_s / STEPS)
             starts.append(np.clip(np.interp(middles + later, middles, self.last), 0.0, most))
         begun = time.process_time()
         found, _, converged = self.solver.solve(starts, common, own, most)

@@ -38,7 +38,7 @@ GAINS = ROOT / 'config' / 'training' / 'gains.json'
 HEADERS = [ROOT / 'include' / 'abs_hil' / 'control' / name for name in ('options.hpp', 'baseline_options.hpp')]
 BOUNDS = ROOT / 'config' / 'training' / 'bounds.json'
 COMBINED_BOUNDS = BOUNDS.with_name('combined-bounds.json')
-#: draws of combined cases, each of them run with both positions of the wheels within a count
+#: draws of combined cases, each case run with two positions of the wheels within a count
 COMBINED_SEEDS, COMBINED_COUNT, PHASES = (20261126, 20261127, 20261128), 110, (1, 2)
 PROFILE = 'plant.friction_profile'
 #: keys that are searched, all of them by factors

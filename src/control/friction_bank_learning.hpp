@@ -114,7 +114,6 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
     const Row noise = look.noise_N2 + square(by_zero) * look.slip_error2;
     const Row reach_theta = theta_variance * phi + covariance * by_zero;
     const Row reach_zero = covariance * phi + zero_variance * by_zero;
-
     const Row per = 1.0 / rig::larger(noise, reach_theta * phi + reach_zero * by_zero + noise);
     const Row residual = look.force_N - theta_N * phi;
     const Row gain_theta = reach_theta * per, gain_zero = reach_zero * per;
