@@ -38,6 +38,7 @@ using Covariance = Eigen::Matrix<double, size, size>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using ConstMap = Eigen::Map<const Rows>;
 using Matrix = Eigen::MatrixXd;
+using Wide = Eigen::Matrix<double, size, Eigen::Dynamic>;  // lazy products of these cost no packing
 
 /// What the readings of each window say: sums over them of weight times products. A reading's row consists of its
 /// derivatives by the window's state, those by the parameters, and its residuals.
@@ -108,7 +109,9 @@ py::dict condense(const py::dict& d) {
         logarithms += std::log(one);
         weights += one;
       }
-      products.noalias() = rows.leftCols(kept) * rows.leftCols(kept).transpose();
+      products.setZero();
+      products.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(kept));
+      products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
       Eigen::Map<Rows>(gram_at + w * m * m, m, m) = products.topLeftCorner(m, m);
       Eigen::Map<Rows>(cross_at + w * m * c, m, c) = products.topRightCorner(m, c);
       Eigen::Map<Rows>(square_at + w * c * c, c, c) = products.bottomRightCorner(c, c);
@@ -157,8 +160,18 @@ struct Disturbed {
     if (ways.ndim() != 2 || ways.shape(0) != disturbances || sds.size() != disturbances || times.size() != disturbances)
       throw std::invalid_argument("give five disturbances");
     into = ConstMap(ways.data(), disturbances, ways.shape(1)).transpose();
+    for (std::ptrdiff_t i = 0; i < into.size(); ++i) {
+      const std::ptrdiff_t parameter = i % into.rows(), disturbance = i / into.rows();
+      if (into(parameter, disturbance) != 0.0)
+        entries.push_back({states + parameter, states + disturbance, into(parameter, disturbance)});
+    }
   }
-  Matrix into;       // (parameters, disturbances)
+  struct Entry {
+    std::ptrdiff_t row, state;
+    double value;
+  };
+  Matrix into;                 // (parameters, disturbances)
+  std::vector<Entry> entries;  // the few of it that are not 0
   const double* sd;  // stationary
   const double* time_constant_s;
 };
@@ -203,19 +216,19 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
   const std::ptrdiff_t p = piece.parameters;
   const std::ptrdiff_t c = piece.sums.columns;
   const std::ptrdiff_t m = states + p;
+  constexpr std::ptrdiff_t stacked = 16;
   Filtered out;
-  out.normal = Rows::Zero(p, p);
-  out.right = Rows::Zero(p, c);
-  out.square = Eigen::VectorXd::Zero(c);
   Covariance P = Covariance::Zero();
-  Matrix X = Matrix::Zero(size, c + p);  // state: the first c columns for each residual, then by parameter
+  Wide X = Wide::Zero(size, c + p);  // state: the first c columns for each residual, then by parameter
   for (int i = 0; i < states; ++i) P(i, i) = piece.prior_sd.data()[i] * piece.prior_sd.data()[i];
   for (int i = 0; i < disturbances; ++i) P(states + i, states + i) = disturbed.sd[i] * disturbed.sd[i];
-  Matrix by_size(m, size);  // products of all with the state's derivatives
-  Matrix W(size, c + p);    // of the state's derivatives with residuals and (negative) parameters
-  Matrix Z(size, c + p);    // the same at the predicted state
-  Matrix V(size, c + p);
+  Eigen::Matrix<double, Eigen::Dynamic, size> by_size(m, size);  // products of all with the state's derivatives
+  Wide W(size, c + p);  // of the state's derivatives with residuals and (negative) parameters
+  Wide Z(size, c + p);  // the same at the predicted state
+  Wide V(size, c + p);
   Matrix Q = Matrix::Zero(c + p, c + p);
+  // The windows' X, W + Z and V, below each other: their products are large ones, which are faster.
+  Matrix Xs(stacked * size, c + p), Ys(stacked * size, c + p), Vs(stacked * size, c + p);
   Covariance F = Covariance::Zero();
   Covariance noise = Covariance::Zero();
   double factors_for_s = -1.0;
@@ -230,44 +243,52 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
     const ConstMap gram(piece.sums.gram.data() + w * m * m, m, m);
     const ConstMap cross(piece.sums.cross.data() + w * m * c, m, c);
     const ConstMap square(piece.sums.square.data() + w * c * c, c, c);
-    by_size.leftCols(states) = gram.leftCols(states);
-    by_size.rightCols(disturbances).noalias() = gram.rightCols(p) * disturbed.into;
+    by_size.leftCols(states) = gram.topRows(states).transpose();
+    by_size.rightCols(disturbances).setZero();
+    for (const auto& [row, state, value] : disturbed.entries) by_size.col(state) += value * gram.row(row).transpose();
     Covariance A;
     A.topRows(states) = by_size.topRows(states);
-    A.bottomRows(disturbances).noalias() = disturbed.into.transpose() * by_size.bottomRows(p);
+    A.bottomRows(disturbances).setZero();
     W.topLeftCorner(states, c) = cross.topRows(states);
-    W.bottomLeftCorner(disturbances, c).noalias() = disturbed.into.transpose() * cross.bottomRows(p);
+    W.bottomLeftCorner(disturbances, c).setZero();
+    for (const auto& [row, state, value] : disturbed.entries) {
+      A.row(state) += value * by_size.row(row);
+      W.row(state).head(c) += value * cross.row(row);
+    }
     W.rightCols(p) = -by_size.bottomRows(p).transpose();
     A /= variance;
     W /= variance;
-    Z.noalias() = W - A * X;
-    Q.topLeftCorner(c, c) = square / variance;
-    Q.topRightCorner(c, p) = -cross.bottomRows(p).transpose() / variance;
-    Q.bottomLeftCorner(p, c) = Q.topRightCorner(c, p).transpose();
-    Q.bottomRightCorner(p, p) = gram.bottomRightCorner(p, p) / variance;
+    Z.noalias() = W - A.lazyProduct(X);
+    Q.topLeftCorner(c, c) += square / variance;
+    Q.bottomLeftCorner(p, c) -= cross.bottomRows(p) / variance;
+    Q.bottomRightCorner(p, p) += gram.bottomRightCorner(p, p) / variance;
     // The readings' covariance is variance / weight and that of the state: the latter leaves V' V less.
     const Covariance L = factor_of(P);
-    const Eigen::LLT<Covariance> inner(Covariance::Identity() + L.transpose() * A * L);
-    V.noalias() = L.transpose() * Z;
-    inner.matrixL().solveInPlace(V);
-    Q.noalias() -= X.transpose() * W;
-    Q.noalias() -= Z.transpose() * X;
-    Q.noalias() -= V.transpose() * V;
-    out.normal += Q.bottomRightCorner(p, p);
-    out.right -= Q.topRightCorner(c, p).transpose();
-    out.square += Q.topLeftCorner(c, c).diagonal();
+    const Covariance AL = A.lazyProduct(L);
+    Covariance root = L.transpose();
+    const Eigen::LLT<Covariance> inner(Covariance::Identity() + root.lazyProduct(AL));
+    inner.matrixL().solveInPlace(root);
+    V.noalias() = root.lazyProduct(Z);
+    const std::ptrdiff_t place = w % stacked * size;
+    Xs.middleRows<size>(place) = X;
+    Ys.middleRows<size>(place) = W + Z;
+    Vs.middleRows<size>(place) = V;
+    if (const std::ptrdiff_t filled = place + size; filled == Xs.rows() || w + 1 == piece.windows) {
+      Q.triangularView<Eigen::Lower>() -= 0.5 * Xs.topRows(filled).transpose() * Ys.topRows(filled);
+      Q.triangularView<Eigen::Lower>() -= 0.5 * Ys.topRows(filled).transpose() * Xs.topRows(filled);
+      Q.triangularView<Eigen::Lower>() -= Vs.topRows(filled).transpose() * Vs.topRows(filled);
+    }
     out.log_variance += piece.sums.readings.data()[angles * w] * std::log(variance) - piece.sums.log_weight.data()[w] +
                         2.0 * inner.matrixLLT().diagonal().array().log().sum();
     out.readings += piece.sums.readings.data()[angles * w + 1];
-    Covariance root = L.transpose();
-    inner.matrixL().solveInPlace(root);
-    const Covariance updated = root.transpose() * root;
+    const Covariance back = root.transpose();
+    const Covariance updated = back.lazyProduct(root);
     if (passed != nullptr) {
       const State predicted = X.col(0) + X.rightCols(p) * *change;
       const State score = Z.col(0) + Z.rightCols(p) * *change;
       passed->push_back({predicted, P, updated, A, score, {}});
     }
-    X.noalias() += root.transpose() * V;
+    X.noalias() += back.lazyProduct(V);
 
     const double duration_s =
         piece.time_s.data()[piece.first.data()[w + 1]] - piece.time_s.data()[piece.first.data()[w]];
@@ -284,13 +305,18 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
         noise(states + i, states + i) = (1.0 - keeps * keeps) * disturbed.sd[i] * disturbed.sd[i];
       }
     }
-    X = F * X;
+    W.noalias() = F.lazyProduct(X);
+    X.swap(W);
     for (int i = 0; i < states; ++i) X(i, 0) += piece.gap.data()[w * states + i];
     X.topRightCorner(states, p) += G;
-    P = F * updated * F.transpose() + noise;
+    const Covariance moved = F.lazyProduct(updated), turned = F.transpose();
+    P = moved.lazyProduct(turned) + noise;
     P = 0.5 * (P + P.transpose()).eval();
     if (passed != nullptr) passed->back().transition = F;
   }
+  out.normal = Q.bottomRightCorner(p, p).selfadjointView<Eigen::Lower>();
+  out.right = -Q.bottomLeftCorner(p, c);
+  out.square = Q.topLeftCorner(c, c).diagonal();
   return out;
 }
 
