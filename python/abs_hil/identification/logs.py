@@ -5,6 +5,7 @@ import io
 import pathlib
 import zlib
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy.ndimage
@@ -51,7 +52,7 @@ class Log:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    @property
+    @cached_property
     def period_s(self) -> float:
         return float(np.median(np.diff(self.time_s)))
 

@@ -1,6 +1,7 @@
 """What can be identified: one row for each parameter, and the two forms of the plant."""
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,7 @@ FLAWS = (FADING, HYSTERESIS, DEAD_TIME)
 WHEELS = ('upper', 'lower')
 
 
+@cache
 def disc_of(wheel: str, log: int) -> tuple[Parameter, Parameter]:
     """What an eccentric disc adds to the readings of one log: sine and cosine of its angle, from the counter's zero. Each
     log has its own, because counters may begin anew."""

@@ -2,6 +2,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -88,7 +89,7 @@ class Problem:
         return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
                    counts_per_rev, tuple(drifts), discs=tuple(discs))
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
         factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()

@@ -113,19 +113,19 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
 
     # The scan needs no more than every fourth millisecond.
     thin = [max(1, round(COARSE_S / log.period_s)) for log in logs]
-    coarse = [(log.time_s[::k], log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
+    coarse = [(0.5 * np.diff(log.time_s[::k]), log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
               for log, motion, k in zip(logs, problem.motions, thin)]
 
     def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
         slopes: list[np.ndarray] = []
         offsets: list[np.ndarray] = []
         for number, first, last in pieces.parts:
-            time_s, duty, turning, k = coarse[number]
+            half_s, duty, turning, k = coarse[number]
             active = (duty >= u0) & (duty > 0)
             keeps = float(np.exp(-c31 * k * logs[number].period_s))
             for into, static in ((slopes, np.where(active, duty, 0.0)), (offsets, active.astype(float))):
                 acts = scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static) * turning
-                whole = np.concatenate([[0.0], np.cumsum(0.5 * (acts[:-1] + acts[1:]) * np.diff(time_s))])
+                whole = np.concatenate([[0.0], np.cumsum((acts[:-1] + acts[1:]) * half_s)])
                 whole = np.interp(np.concatenate([first, last]), k * np.arange(len(whole)), whole)
                 into.append(whole[len(first):] - whole[:len(first)])
         return np.concatenate(slopes), np.concatenate(offsets)
@@ -135,18 +135,17 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
     upper = apart & (turning1 > 0.999 * pieces.duration)
     lower = apart & (turning2 > 0.999 * pieces.duration)
 
+    friction1 = {'d1_Nms_rad': pieces.angle[:, 0], 'M10_Nm': turning1, 'J1_kg_m2': pieces.dw[:, 0]}
+    friction2 = {'d2_Nms_rad': pieces.angle[:, 1], 'M20_Nm': turning2, **{k: -v for k, v in motor.items()}}
+    parts = ((usable, r2 / r1, 1.0), (upper, 1.0, 0.0), (lower, 0.0, 1.0))
+    unbraked = np.concatenate([np.stack([upper_by * friction1.get(key, zero) + lower_by * friction2.get(key, zero)
+                                         for key in _LINEAR], axis=1)[rows] for rows, upper_by, lower_by in parts])
+    target = np.concatenate([-lower_by * J2 * pieces.dw[rows, 1] for rows, _, lower_by in parts])
+
     def fit(u0: float, c31: float) -> tuple[float, np.ndarray]:
-        slope, offset = brake_columns(u0, c31)
-        friction1 = {'d1_Nms_rad': pieces.angle[:, 0], 'M10_Nm': turning1, 'b1_Nm': slope, 'b2_Nm': offset,
-                     'J1_kg_m2': pieces.dw[:, 0]}
-        friction2 = {'d2_Nms_rad': pieces.angle[:, 1], 'M20_Nm': turning2, **{k: -v for k, v in motor.items()}}
-        blocks, targets = [], []
-        for rows, upper_by, lower_by in ((usable, r2 / r1, 1.0), (upper, 1.0, 0.0), (lower, 0.0, 1.0)):
-            block = np.stack([upper_by * friction1.get(key, zero) + lower_by * friction2.get(key, zero)
-                              for key in _LINEAR], axis=1)
-            blocks.append(block[rows])
-            targets.append(-lower_by * J2 * pieces.dw[rows, 1])
-        A, y = np.concatenate(blocks), np.concatenate(targets)
+        A, y = unbraked.copy(), target
+        for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31)):
+            A[:, _LINEAR.index(key)] = np.concatenate([upper_by * column[rows] for rows, upper_by, _ in parts])
         known = {key: value[key] for key in _LINEAR if key in fixed}
         for key, number in known.items():
             y = y - A[:, _LINEAR.index(key)] * number
