@@ -1,9 +1,8 @@
 // The prediction-error filter of identification (python/abs_hil/identification): it weighs a log's counts with the
 // sensitivities of identification_sensitivities.cpp.
 //
-// Within a window nothing but the counts' steps disturbs, so all of its readings together are one measurement of the
-// state at its start and of the parameters: their sums of squares and products say everything. `condense` makes these
-// sums once for each linearisation; the filter then takes one step for each window, whatever the disturbances.
+// It takes one step for each window, whatever the disturbances: with the sums that identification_sums.cpp makes once
+// for each linearisation.
 
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
@@ -21,6 +20,8 @@
 #include "bindings.hpp"
 
 namespace abs_hil::python {
+
+py::dict condense(const py::dict& d);  // identification_sums.cpp
 
 namespace {
 
@@ -60,75 +61,6 @@ struct Sums {
   std::ptrdiff_t windows{}, columns{};
 };
 
-/// The sums of each window. Shapes as `linearise` gives them; `residual` (rows, 2, columns), `weight` (rows, 2).
-py::dict condense(const py::dict& d) {
-  const auto by_state = d["by_state"].cast<Array>();
-  const auto by_parameter = d["by_parameter"].cast<Array>();
-  const auto residual = d["residual"].cast<Array>();
-  const auto weight = d["weight"].cast<Array>();
-  const auto first = d["first"].cast<Indices>();
-  const std::ptrdiff_t windows = first.size() - 1;
-  const std::ptrdiff_t p = by_parameter.shape(2);
-  const std::ptrdiff_t c = residual.shape(2);
-  const std::ptrdiff_t m = states + p;
-  if (windows < 1 || by_state.shape(0) != by_parameter.shape(0) || residual.shape(0) != by_parameter.shape(0) ||
-      weight.shape(0) != by_parameter.shape(0) || first.data()[windows] - first.data()[0] != by_parameter.shape(0)) {
-    throw std::invalid_argument("the arrays of a piece do not fit together");
-  }
-  Array gram({windows, m, m});
-  Array cross({windows, m, c});
-  Array square({windows, c, c});
-  Array log_weight(windows);
-  Array readings({windows, std::ptrdiff_t{2}});
-  double* const gram_at = gram.mutable_data();
-  double* const cross_at = cross.mutable_data();
-  double* const square_at = square.mutable_data();
-  double* const log_weight_at = log_weight.mutable_data();
-  double* const readings_at = readings.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    Matrix rows;
-    Matrix products(m + c, m + c);
-    for (std::ptrdiff_t w = 0; w < windows; ++w) {
-      const std::ptrdiff_t begin = angles * (first.data()[w] - first.data()[0]);
-      const std::ptrdiff_t end = angles * (first.data()[w + 1] - first.data()[0]);
-      rows.resize(m + c, end - begin);
-      std::ptrdiff_t kept = 0;
-      double logarithms = 0.0;
-      double weights = 0.0;
-      for (std::ptrdiff_t at = begin; at < end; ++at) {
-        const double one = weight.data()[at];
-        if (!(one > 0.0)) continue;
-        auto row = rows.col(kept++);
-        row(at % angles) = 1.0;
-        row(1 - at % angles) = 0.0;
-        for (std::ptrdiff_t i = 0; i < moving; ++i) row(angles + i) = by_state.data()[at * moving + i];
-        for (std::ptrdiff_t i = 0; i < p; ++i) row(states + i) = by_parameter.data()[at * p + i];
-        for (std::ptrdiff_t i = 0; i < c; ++i) row(m + i) = residual.data()[at * c + i];
-        row *= std::sqrt(one);
-        logarithms += std::log(one);
-        weights += one;
-      }
-      products.setZero();
-      products.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(kept));
-      products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
-      Eigen::Map<Rows>(gram_at + w * m * m, m, m) = products.topLeftCorner(m, m);
-      Eigen::Map<Rows>(cross_at + w * m * c, m, c) = products.topRightCorner(m, c);
-      Eigen::Map<Rows>(square_at + w * c * c, c, c) = products.bottomRightCorner(c, c);
-      log_weight_at[w] = logarithms;
-      readings_at[angles * w] = static_cast<double>(kept);
-      readings_at[angles * w + 1] = weights;
-    }
-  }
-  py::dict result;
-  result["gram"] = gram;
-  result["cross"] = cross;
-  result["square"] = square;
-  result["log_weight"] = log_weight;
-  result["readings"] = readings;
-  return result;
-}
-
 /// A linearised piece of a log (`linearise`, `condense`).
 struct Piece {
   explicit Piece(const py::dict& d)
@@ -142,8 +74,9 @@ struct Piece {
         prior_sd(d["prior_sd"].cast<Array>()) {
     windows = first.size() - 1;
     parameters = end_by_parameter.shape(2);
-    if (sums.windows != windows || sums.gram.shape(1) != states + parameters || gap.shape(0) != windows ||
-        stands.shape(0) != windows || prior_sd.size() != states || first.data()[windows] >= time_s.size()) {
+    if (sums.windows != windows || sums.gram.shape(1) != states + parameters ||
+        gap.size() != windows * states * sums.columns || stands.shape(0) != windows || prior_sd.size() != states ||
+        first.data()[windows] >= time_s.size()) {
       throw std::invalid_argument("the arrays of a piece do not fit together");
     }
   }
@@ -172,7 +105,7 @@ struct Disturbed {
   };
   Matrix into;                 // (parameters, disturbances)
   std::vector<Entry> entries;  // the few of it that are not 0
-  const double* sd;  // stationary
+  const double* sd;            // stationary
   const double* time_constant_s;
 };
 
@@ -210,7 +143,9 @@ Covariance factor_of(const Covariance& P) {
 
 /// The Kalman filter over one piece. The estimate of the state is affine in the change of the parameters, and so is
 /// each innovation: the normal equations of the parameters follow from one pass.
-/// @param change  of the parameters, for `passed`; both may be null
+/// @param change  of the parameters, for `passed`; both may be null. With it, no normal equations follow: the states
+/// are
+///                those at this change
 Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance, const Eigen::VectorXd* change,
                 std::vector<Passed>* passed) {
   const std::ptrdiff_t p = piece.parameters;
@@ -219,16 +154,18 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
   constexpr std::ptrdiff_t stacked = 16;
   Filtered out;
   Covariance P = Covariance::Zero();
-  Wide X = Wide::Zero(size, c + p);  // state: the first c columns for each residual, then by parameter
+  const std::ptrdiff_t n = change == nullptr ? c + p : 1;
+  Wide X = Wide::Zero(size, n);  // state: the first c columns for each residual, then by parameter
   for (int i = 0; i < states; ++i) P(i, i) = piece.prior_sd.data()[i] * piece.prior_sd.data()[i];
   for (int i = 0; i < disturbances; ++i) P(states + i, states + i) = disturbed.sd[i] * disturbed.sd[i];
   Eigen::Matrix<double, Eigen::Dynamic, size> by_size(m, size);  // products of all with the state's derivatives
   Wide W(size, c + p);  // of the state's derivatives with residuals and (negative) parameters
-  Wide Z(size, c + p);  // the same at the predicted state
-  Wide V(size, c + p);
+  Wide D(size, n);      // the same for the columns of the state
+  Wide Z(size, n);      // the same at the predicted state
+  Wide V(size, n);
   Matrix Q = Matrix::Zero(c + p, c + p);
-  // The windows' X, W + Z and V, below each other: their products are large ones, which are faster.
-  Matrix Xs(stacked * size, c + p), Ys(stacked * size, c + p), Vs(stacked * size, c + p);
+  // The windows' X, D + Z and V, below each other: their products are large ones, which are faster.
+  Matrix Xs(stacked * size, n), Ys(stacked * size, n), Vs(stacked * size, n);
   Covariance F = Covariance::Zero();
   Covariance noise = Covariance::Zero();
   double factors_for_s = -1.0;
@@ -258,10 +195,12 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
     W.rightCols(p) = -by_size.bottomRows(p).transpose();
     A /= variance;
     W /= variance;
-    Z.noalias() = W - A.lazyProduct(X);
-    Q.topLeftCorner(c, c) += square / variance;
-    Q.bottomLeftCorner(p, c) -= cross.bottomRows(p) / variance;
-    Q.bottomRightCorner(p, p) += gram.bottomRightCorner(p, p) / variance;
+    if (change == nullptr) {
+      D = W;
+    } else {
+      D = W.col(0) + W.rightCols(p) * *change;
+    }
+    Z.noalias() = D - A.lazyProduct(X);
     // The readings' covariance is variance / weight and that of the state: the latter leaves V' V less.
     const Covariance L = factor_of(P);
     const Covariance AL = A.lazyProduct(L);
@@ -269,25 +208,26 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
     const Eigen::LLT<Covariance> inner(Covariance::Identity() + root.lazyProduct(AL));
     inner.matrixL().solveInPlace(root);
     V.noalias() = root.lazyProduct(Z);
-    const std::ptrdiff_t place = w % stacked * size;
-    Xs.middleRows<size>(place) = X;
-    Ys.middleRows<size>(place) = W + Z;
-    Vs.middleRows<size>(place) = V;
-    if (const std::ptrdiff_t filled = place + size; filled == Xs.rows() || w + 1 == piece.windows) {
-      Q.triangularView<Eigen::Lower>() -= 0.5 * Xs.topRows(filled).transpose() * Ys.topRows(filled);
-      Q.triangularView<Eigen::Lower>() -= 0.5 * Ys.topRows(filled).transpose() * Xs.topRows(filled);
-      Q.triangularView<Eigen::Lower>() -= Vs.topRows(filled).transpose() * Vs.topRows(filled);
+    if (change == nullptr) {
+      Q.topLeftCorner(c, c) += square / variance;
+      Q.bottomLeftCorner(p, c) -= cross.bottomRows(p) / variance;
+      Q.bottomRightCorner(p, p) += gram.bottomRightCorner(p, p) / variance;
+      const std::ptrdiff_t place = w % stacked * size;
+      Xs.middleRows<size>(place) = X;
+      Ys.middleRows<size>(place) = D + Z;
+      Vs.middleRows<size>(place) = V;
+      if (const std::ptrdiff_t filled = place + size; filled == Xs.rows() || w + 1 == piece.windows) {
+        Q.triangularView<Eigen::Lower>() -= 0.5 * Xs.topRows(filled).transpose() * Ys.topRows(filled);
+        Q.triangularView<Eigen::Lower>() -= 0.5 * Ys.topRows(filled).transpose() * Xs.topRows(filled);
+        Q.triangularView<Eigen::Lower>() -= Vs.topRows(filled).transpose() * Vs.topRows(filled);
+      }
     }
     out.log_variance += piece.sums.readings.data()[angles * w] * std::log(variance) - piece.sums.log_weight.data()[w] +
                         2.0 * inner.matrixLLT().diagonal().array().log().sum();
     out.readings += piece.sums.readings.data()[angles * w + 1];
     const Covariance back = root.transpose();
     const Covariance updated = back.lazyProduct(root);
-    if (passed != nullptr) {
-      const State predicted = X.col(0) + X.rightCols(p) * *change;
-      const State score = Z.col(0) + Z.rightCols(p) * *change;
-      passed->push_back({predicted, P, updated, A, score, {}});
-    }
+    if (passed != nullptr) passed->push_back({X.col(0), P, updated, A, Z.col(0), {}});
     X.noalias() += back.lazyProduct(V);
 
     const double duration_s =
@@ -305,10 +245,14 @@ Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance,
         noise(states + i, states + i) = (1.0 - keeps * keeps) * disturbed.sd[i] * disturbed.sd[i];
       }
     }
-    W.noalias() = F.lazyProduct(X);
-    X.swap(W);
-    for (int i = 0; i < states; ++i) X(i, 0) += piece.gap.data()[w * states + i];
-    X.topRightCorner(states, p) += G;
+    V.noalias() = F.lazyProduct(X);
+    X.swap(V);
+    X.topLeftCorner(states, c) += ConstMap(piece.gap.data() + w * states * c, states, c);
+    if (change == nullptr) {
+      X.topRightCorner(states, p) += G;
+    } else {
+      X.topRows(states) += G * *change;
+    }
     const Covariance moved = F.lazyProduct(updated), turned = F.transpose();
     P = moved.lazyProduct(turned) + noise;
     P = 0.5 * (P + P.transpose()).eval();
@@ -377,11 +321,66 @@ py::tuple smooth(const py::dict& d, const Array& by_parameters, const Array& dir
   return py::make_tuple(changes, left);
 }
 
+/// Slopes of -2 log likelihood at a change of the parameters: by the logarithms of the disturbances' standard
+/// deviations and of their time constants, shape (2, 5). M is the slope by a predicted covariance; backwards as in
+/// `smooth`.
+Array slopes(const py::dict& d, const Array& by_parameters, const Array& directions, const Array& sd,
+             const Array& time_constant_s, double variance) {
+  const Piece piece(d);
+  const Disturbed disturbed(directions, sd, time_constant_s);
+  if (by_parameters.size() != piece.parameters || piece.sums.columns != 1)
+    throw std::invalid_argument("give one change of each parameter");
+  Array all({2, disturbances});
+  double* const by_sd = all.mutable_data();
+  double* const by_time = by_sd + disturbances;
+  const py::gil_scoped_release release;
+  const Eigen::VectorXd change = Eigen::Map<const Eigen::VectorXd>(by_parameters.data(), piece.parameters);
+  std::vector<Passed> passed;
+  passed.reserve(static_cast<std::size_t>(piece.windows));
+  filter(piece, disturbed, variance, &change, &passed);
+  std::fill_n(by_sd, 2 * disturbances, 0.0);
+  State adjoint = State::Zero();
+  Covariance information = Covariance::Zero();
+  Covariance M = Covariance::Zero();
+  for (std::ptrdiff_t w = piece.windows - 1; w >= 0; --w) {
+    const Passed& at = passed[static_cast<std::size_t>(w)];
+    const Covariance back = at.transition.transpose();
+    const Covariance through = back.lazyProduct(M), by_transition = at.updated.lazyProduct(through);
+    const State updated = at.predicted + at.updated * at.score;
+    for (int i = 0; i < disturbances; ++i) {
+      const int state = states + i;
+      const double keeps = at.transition(state, state);
+      const double by_noise = M(state, state) * disturbed.sd[i] * disturbed.sd[i];
+      by_sd[i] += 2.0 * (1.0 - keeps * keeps) * by_noise;
+      by_time[i] -= 2.0 * keeps * std::log(keeps) *
+                    (by_transition(state, state) - updated(state) * adjoint(state) - keeps * by_noise);
+    }
+    const Covariance passing = Covariance::Identity() - at.information.lazyProduct(at.updated);
+    const Covariance passing_back = passing.transpose();
+    const Covariance behind = back.lazyProduct(information), moved = behind.lazyProduct(at.transition);
+    const Covariance taken = passing.lazyProduct(moved);
+    adjoint = (passing * (back * adjoint + at.score)).eval();
+    information = taken.lazyProduct(passing_back) + passing.lazyProduct(at.information);
+    for (int i = 0; i < 2; ++i) {
+      if (piece.stands.data()[w * angles + i] == 0.0) continue;
+      adjoint(angles + i) = 0.0;
+      information.row(angles + i).setZero();
+      information.col(angles + i).setZero();
+    }
+    M = information - adjoint * adjoint.transpose();
+  }
+  for (int i = 0; i < disturbances; ++i)
+    by_sd[i] += 2.0 * M(states + i, states + i) * disturbed.sd[i] * disturbed.sd[i];
+  return all;
+}
+
 }  // namespace
 
 void add_identification_filter(py::module_& module) {
   module.def("condense", &condense, py::arg("piece"));
   module.def("filter_pieces", &filter_pieces, py::arg("pieces"), py::arg("directions"), py::arg("sd"),
+             py::arg("time_constant_s"), py::arg("variance"));
+  module.def("slopes", &slopes, py::arg("piece"), py::arg("change"), py::arg("directions"), py::arg("sd"),
              py::arg("time_constant_s"), py::arg("variance"));
   module.def("smooth", &smooth, py::arg("piece"), py::arg("change"), py::arg("directions"), py::arg("sd"),
              py::arg("time_constant_s"), py::arg("variance"));

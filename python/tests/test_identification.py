@@ -13,7 +13,7 @@ from abs_hil.core import _core
 from abs_hil.identification import intervals
 from abs_hil.identification.advice import advise, log_of
 from abs_hil.identification.fit import start_fit
-from abs_hil.identification.linear import _relative, linearise, linearise_where_better, step
+from abs_hil.identification.linear import _relative, linearise, linearise_where_better, run_filter, slopes, step
 from abs_hil.identification.logs import load_log, motion_of, segments_of
 from abs_hil.identification.parameters import FORMS
 from abs_hil.identification.problem import COUNT_VARIANCE, QUIET, Disturbances, Fit, Move, Problem, pieces_of
@@ -247,7 +247,7 @@ def test_the_filter_is_generalised_least_squares(logs):
         G = linear['end_by_parameter'][w]
         state = F @ state + (G @ way.T) @ unit
         by_parameter = F @ by_parameter + G
-        constant = F @ constant + linear['gap'][w]
+        constant = F @ constant + linear['gap'][w, :, 0]
     prior = np.zeros((size, size))
     prior[:5, :5] = np.diag(piece.prior_sd**2)
     time_s = problem.logs[0].time_s[piece.first]
@@ -263,6 +263,24 @@ def test_the_filter_is_generalised_least_squares(logs):
     assert square[0] == pytest.approx(y @ solved[:, n], rel=1e-5)
     assert log_variance == pytest.approx(np.linalg.slogdet(S)[1], rel=1e-7)
     assert len(fit.keys) == n
+
+
+def test_slopes_by_the_disturbances_are_those_of_the_likelihood(logs):
+    """The log contains a wheel that stands."""
+    problem = Problem.of(MAGIC, 'paper-table1', [logs[2]], {})
+    values = {p.key: truth_of(p.key) for p in MAGIC.parameters}
+    fit = Fit(problem, values, pieces_of(problem, values, 0.05), QUIET, 0.05, np.ones(len(MAGIC.parameters), bool))
+    fit.scale = linearise(problem, values, fit.pieces)
+    assert any(piece.stands.any() for piece in fit.pieces)
+    logarithms = np.log([[0.02, 0.01, 0.03, 0.05, 0.04], [0.3, 0.2, 0.5, 0.3, 0.1]])
+    found = slopes(fit, disturbed := Disturbances(*np.exp(logarithms)), run_filter(fit, disturbed)[1])
+    for place in np.ndindex(2, 5):
+        costs = []
+        for step_by in (1e-3, -1e-3):
+            moved = logarithms.copy()
+            moved[place] += step_by
+            costs.append(run_filter(fit, Disturbances(*np.exp(moved)))[0])
+        assert found[place] == pytest.approx((costs[0] - costs[1]) / 2e-3, rel=1e-3, abs=1e-3), place
 
 
 def test_bootstrap_spread_is_that_of_the_information(found):

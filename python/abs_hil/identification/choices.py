@@ -91,16 +91,14 @@ def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
         return fit
     fastest = fastest_Nm_s(fit, problem.logs)
     affected = [bool(np.any(problem.logs[piece.log].brake_pwm[piece.rows] > 0)) for piece in fit.pieces]
-    others = other_costs(fit, disturbances, affected)
 
-    def cost_of(limit_Nm_s: float) -> float:
-        check()
-        return others({**fit.values, RATE_LIMIT.key: limit_Nm_s})
+    def costs_of(shares: Sequence[float]) -> list[float]:
+        return other_costs(fit, disturbances, affected, RATE_LIMIT.key, [share * fastest for share in shares], check)
 
-    without = cost_of(0.0)
-    if min(cost_of(share * fastest) for share in FIRST_SHARES) > without - WORTH_A_LOOK:
+    without, *first = costs_of((0.0, *FIRST_SHARES))
+    if min(first) > without - WORTH_A_LOOK:
         return fit
-    costs = [cost_of(share * fastest) for share in SHARES]
+    costs = costs_of(SHARES)
     best = int(np.argmin(costs))
     if not costs[best] < without - CLEAR_GAIN:
         return fit

@@ -13,7 +13,8 @@ import numpy as np
 import scipy.optimize
 
 from ..core import _core
-from .linear import CONVERGED, _measure, disc_waves_rad, filtered, run_filter, solved, step, to_rest
+from .brake_flaws import act
+from .linear import CONVERGED, disc_waves_rad, filtered, measure, run_filter, solved, step, to_rest
 from .logs import motion_of
 from .parameters import DELAY, RATE_LIMIT
 from .problem import LARGEST_QUIET_RMS, QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
@@ -28,29 +29,39 @@ SMALL_DISC_RAD = 3e-4
 HOPELESS_RMS = 10.0
 
 
-def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool]) -> Callable[[Mapping[str, float]], float]:
-    """A function of other values of some parameters: -2 log likelihood. It simulates the affected pieces anew and keeps the
-    sensitivities, so the other parameters may follow only as far as they are uncertain."""
+def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool], key: str, others: Sequence[float],
+                check: Callable[[], None]) -> list[float]:
+    """-2 log likelihood at other values of one parameter. It simulates the affected pieces anew and keeps the sensitivities,
+    so the other parameters may follow only as far as they are uncertain."""
     problem = fit.problem
+    values = [{**fit.values, key: other} for other in others]
+    # With flaws of the brake, the duties that ask for its torque depend on the value: one by one.
+    together = [values] if not act(fit.values) else [[one] for one in values]
     within = 5.0 * np.sqrt(np.diag(fit.covariance()))
     rest = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], disturbances)
-
-    def cost_of(values: Mapping[str, float]) -> float:
-        changed = []
-        inputs = [problem.flawed(number, values)[0].inputs() for number in range(len(problem.logs))]
+    costs = []
+    for some in together:
+        found = list(rest)
         for piece, hit in zip(fit.pieces, affected):
-            if hit:
-                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
-                                        piece.first, piece.states)
-                moved = dataclasses.replace(piece, linear=dict(piece.linear))
-                moved.linear.update(angles=other['angles'], end=other['end'])
-                _measure(problem, values, moved)
-                changed.append(moved)
-        found = [*rest, *filtered(fit, changed, disturbances)]
-        N, n = np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found))
-        x = solved(fit, N, n, -within, within)
-        return sum(float(one[2][0]) + one[3] for one in found) - float(2 * n @ x - x @ N @ x)
-    return cost_of
+            if not hit:
+                continue
+            check()
+            first, *more = [problem.plant_values(one, piece.log) for one in some]
+            other = _core.linearise(problem.base, first, [(one, 1.0, 'always') for one in more],
+                                    problem.flawed(piece.log, some[0])[0].inputs(), piece.first, piece.states)
+            angles, ends = ([other[at]] + [other[at] + other[by][:, :, i] for i in range(len(more))]
+                            for at, by in (('angles', 'by_parameter'), ('end', 'end_by_parameter')))
+            moved = dataclasses.replace(piece, linear=dict(piece.linear))
+            measure(problem, fit.values, moved, angles, ends)
+            found += filtered(fit, [moved], disturbances)
+        N = np.asarray(sum(one[0] for one in found))
+        for i in range(len(some)):
+            at = [i if len(one[2]) > 1 else 0 for one in found]  # pieces that were not affected have one column
+            n = np.asarray(sum(one[1][:, column] for one, column in zip(found, at)))
+            x = solved(fit, N, n, -within, within)
+            costs.append(sum(float(one[2][column]) + one[3] for one, column in zip(found, at))
+                         - float(2 * n @ x - x @ N @ x))
+    return costs
 
 
 def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
@@ -77,13 +88,10 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
     acting = [problem.logs[piece.log].brake_pwm[max(piece.rows.start - 1, 0):piece.rows.stop] for piece in fit.pieces]
     affected = [bool(np.any((duty >= edges[0]) & (duty <= edges[-1]))) for duty in acting]
-    cost_of = other_costs(fit, disturbances, affected)
-    tried = []
-    for begin, end in gaps:
-        check()
-        # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
-        cost = cost_of({**fit.values, 'u0': max(0.5 * (begin + end), end - 1e-3)})
-        tried.append((float(begin), float(end), cost))
+    # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
+    inside = [max(0.5 * (begin + end), end - 1e-3) for begin, end in gaps]
+    costs = other_costs(fit, disturbances, affected, 'u0', inside, check)
+    tried = [(float(begin), float(end), cost) for (begin, end), cost in zip(gaps, costs)]
     best = min(tried, key=lambda gap: gap[2])
     fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
     return tried

@@ -40,10 +40,10 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
         size = len(fit.scale)
         N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
         for piece in fit.pieces:
-            exact = piece.linear['read'][:, :, None] / per_count
+            exact = piece.linear['read'] / per_count
             phase = chosen[piece.log][None]
             residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
-            changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
+            changed = {**piece.linear, 'residual': residual, 'gap': np.zeros((*piece.states.shape, chosen.shape[2]))}
             changed.update(_core.condense(changed))
             found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]
             N, n = N + found[0], n + found[1]

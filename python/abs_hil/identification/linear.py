@@ -63,7 +63,7 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
                     piece.linear[name][:, :, simulated] = simulated_ones[:, :, :simulated.sum()]
                 _by_flaws(problem, values, scale, piece, amount, {name: one[:, :, -1] for name, one in few.items()})
                 _read_by_discs(problem, scale, piece)
-            _measure(problem, values, piece)
+            measure(problem, values, piece, [piece.linear['angles']], [piece.linear['end']])
     return scale
 
 
@@ -100,17 +100,19 @@ def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:
             piece.linear['by_parameter'][:, number, column] = scale[i] * wave
 
 
-def _measure(problem: Problem, values: Mapping[str, float], piece: Piece) -> None:
-    """What the filter needs beside the sensitivities: residuals, weights, gaps between windows."""
+def measure(problem: Problem, values: Mapping[str, float], piece: Piece, angles: Sequence[np.ndarray],
+            ends: Sequence[np.ndarray]) -> None:
+    """What the filter needs beside the sensitivities: residuals, weights, gaps between windows. There is a column for each
+    of the simulations that `angles` and `ends` come from."""
     motion, linear = problem.motions[piece.log], piece.linear
     angle = motion.angle_rad[piece.rows]
-    read = linear['angles'].copy()
-    read += disc_waves_rad(problem, values, piece.log, read)
-    residual = np.nan_to_num(angle) - read
+    read = np.stack([one + disc_waves_rad(problem, values, piece.log, one) for one in angles], axis=2)
+    residual = np.nan_to_num(angle)[:, :, None] - read
     weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
-    gap = np.zeros_like(piece.states)
-    gap[:-1] = linear['end'][:-1] - piece.states[1:]
-    linear.update(read=read, residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
+    gap = np.zeros((*piece.states.shape, len(ends)))
+    for column, end in enumerate(ends):
+        gap[:-1, :, column] = end[:-1] - piece.states[1:]
+    linear.update(read=read, residual=residual, weight=weight, gap=gap, stands=piece.stands, first=piece.first,
                   prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
     linear.update(_core.condense(linear))
 
@@ -254,6 +256,16 @@ def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | N
         for piece, states in zip(fit.pieces, last.states):
             piece.states = 0.5 * (piece.states + states)
     return found
+
+
+def slopes(fit: Fit, disturbances: Disturbances, found: Sequence[Any]) -> np.ndarray:
+    """Of the -2 log likelihood of `run_filter`, which gave `found`: by the logarithms of the disturbances' sizes and of
+    their times, shape (2, 5). At the best parameters these need not follow."""
+    x = solved(fit, np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found)))
+    way = _relative(fit.problem, fit.values, fit.scale)
+    return np.asarray(sum(_core.slopes(piece.linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]),
+                                       disturbances.sd, disturbances.time_constant_s, fit.problem.variance_rad2)
+                          for piece in fit.pieces))
 
 
 def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
