@@ -25,14 +25,20 @@ from abs_hil.identification.advice import log_of  # noqa: E402
 
 FLAWS = {'fading': ('brake_fading_per_J', 1e-4, 4e-4), 'dead time': ('brake_dead_time_s', 1e-3, 6e-3),
          'hysteresis': ('brake_hysteresis', 0.03, 0.12), 'rate limit': ('brake_rate_limit_Nm_s', 60.0, 140.0),
-         'eccentric disc': ('upper_encoder_eccentricity_rad', 1e-3, 4e-3)}
-#: of rigs with equations of their own: arguments of other_rig.driven, and the words that a refusal must hold
-OTHERS = {'two lags': ({'release': 1.5}, 'lets go faster'),
-          'friction by sliding speed': ({'by_sliding_s_m': 0.02}, 'changes with the sliding speed')}
+         'eccentric disc': ('upper_encoder_eccentricity_rad', 1e-3, 4e-3), 'release': ('brake_release_ratio', 0.6, 1.8),
+         'curved map': ('brake_curvature', -0.2, 0.3), 'falling friction': ('friction_fall_s_m', 0.005, 0.03)}
+#: of rigs with equations of their own: arguments of other_rig.driven, and the plant's parameter that has this value, or the
+#: words that a refusal must hold
+OTHERS = {'two lags': ({'release': 1.5}, 'brake_release_ratio'), 'bent map': ({'curvature': 0.2}, 'brake_curvature'),
+          'friction by sliding speed': ({'by_sliding_s_m': 0.02}, 'friction_fall_s_m'),
+          "friction by the car's speed": ({'by_speed_s_m': 0.01}, "changes with the lower wheel's speed"),
+          'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0}, 'the brake gets')}
 #: features of each kind, joined by " + "
 KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc', 'fading + dead time', 'hysteresis + rate limit',
-         'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time')
-KINDS_OF_OTHERS = ('other', 'two lags', 'friction by sliding speed', 'two lags + quiet')
+         'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time',
+         'release', 'curved map', 'falling friction', 'release + curved map + fading')
+KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed', 'two lags + quiet',
+                   "friction by the car's speed", 'brake that cools')
 
 
 def one(plant, kind, seed, keep=None):
@@ -58,7 +64,8 @@ def tried(plant, kind, seed):
     if 'eccentric disc' in features:
         truth['upper_encoder_phase_rad'] = random.uniform(-3, 3)
     settings = {f'plant.{key}': value for key, value in {**values_of(plant), **truth}.items()}
-    lacks = {key: value for word in features if word in OTHERS for key, value in OTHERS[word][0].items()}
+    others = [OTHERS[word] for word in features if word in OTHERS]
+    lacks = {key: value for arguments, _ in others for key, value in arguments.items()}
     by_others = bool(lacks) or 'other' in features
     logs = []
     for name in EXPERIMENTS:
@@ -68,9 +75,10 @@ def tried(plant, kind, seed):
             values = {key.removeprefix('plant.'): value for key, value in settings.items()}
             log = driven(log, values, random, wander=0.0 if 'quiet' in features else 1.0, **lacks)
         logs.append(log)
+    truth.update({key: next(iter(arguments.values())) for arguments, key in others if key in values_of(plant)})
     found = abs_hil.identify(logs, plant, seed=seed)
     held = [e.low <= truth[key] <= e.high for key, e in found.parameters.items() if key in truth and e.low is not None]
-    cause = next((OTHERS[word][1] for word in features if word in OTHERS), '')
+    cause = next((words for _, words in others if words not in truth), '')
     return bool(found.undecided or found.form == form.name), int(sum(held)), len(held), found.misfit, cause
 
 

@@ -1,4 +1,4 @@
-"""A rig by equations of its own, in Python, with a brake or a tyre that the plant lacks (docs/identification.md).
+"""A rig by equations of its own, in Python, with a brake or a tyre that the plant has or lacks (docs/identification.md).
 
 Wheels: J1 w1' = r1 F - T - M10 - d1 w1,  J2 w2' = M - r2 F - M20 - d2 w2. Magic formula under a constant load:
 F = theta sin(C atan(B s)), s = (r2 w2 - r1 w1) / max(r2 w2, r1 w1). Brake: T' = c31 (b(u) - T). Motor:
@@ -17,12 +17,14 @@ STEP_S = 5e-4
 PER_COUNT_RAD = 2 * math.pi / 4096
 
 
-def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0, fading_per_J=0.0, cools_in_s=math.inf):
+def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_sliding_s_m=0.0, by_speed_s_m=0.0,
+           fading_per_J=0.0, cools_in_s=math.inf):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
-    by_sliding_s_m: by how much of itself the friction falls for each m/s between the wheels' surfaces;
-    fading_per_J: share of the brake's torque lost for each joule in it, which leaves it over `cools_in_s`
+    curvature: share of the straight map that a small torque lacks; by_sliding_s_m, by_speed_s_m: by how much of itself the
+    friction falls for each m/s between the wheels' surfaces, and of the lower one; fading_per_J: share of the brake's
+    torque lost for each joule in it, which leaves it over `cools_in_s`
     """
     v = values
     angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
@@ -33,11 +35,12 @@ def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0, fad
     factors = [1 + wander * sd * random.standard_normal(places) for sd in WANDER]
 
     def rates(w1, w2, torque, hot, brake, motor, apart, factor):
-        target = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) * factor[1] * hot if brake >= v['u0'] else 0.0
+        straight = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) if brake >= v['u0'] else 0.0
+        target = straight * (1 + curvature * (straight / (v['b1_Nm'] + v['b2_Nm']) - 1)) * factor[1] * hot
         speed1, speed2 = v['r1_m'] * w1, v['r2_m'] * w2
         force, fastest = 0.0, max(abs(speed1), abs(speed2))
         if not apart and fastest > 0.02:
-            theta = v['theta_N'] * factor[0] * (1 - by_sliding_s_m * abs(speed2 - speed1))
+            theta = v['theta_N'] * factor[0] * (1 - by_sliding_s_m * abs(speed2 - speed1)) * (1 - by_speed_s_m * abs(speed2))
             force = theta * math.sin(v['C'] * math.atan(v['B'] * (speed2 - speed1) / fastest))
         drive = v['motor_stall_torque_Nm'] * factor[2] * motor * (1 - w2 / v['motor_no_load_speed_rad_s'])
         held1 = torque + factor[3] * (v['M10_Nm'] + v['d1_Nms_rad'] * w1)

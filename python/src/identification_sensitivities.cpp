@@ -153,7 +153,8 @@ class LanesOf : public Lanes {
     const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(options);
     const auto* tyre = std::get_if<Tyre<double>>(&tyres);
     if (tyre == nullptr || options.ideal_actuator || !options.friction_profile.empty() ||
-        plant_sim::Drift(options.drift).any() || options.brake_flaws != plant_sim::BrakeFlaws{})
+        plant_sim::Drift(options.drift).any() ||
+        options.brake_flaws != plant_sim::BrakeFlaws{.release_ratio = options.brake_flaws.release_ratio})
       return std::nullopt;
     const plant_sim::LoadModel loads = plant_sim::make_load_model(options, tyre->peak_mu(), 1.0);
     const auto* load = std::get_if<Load<double>>(&loads);
@@ -164,6 +165,7 @@ class LanesOf : public Lanes {
     plant.wheels = plant_sim::BasicWheels<double>(options.rig.wheels);
     plant.brake = rig::BasicBrake<double>(options.rig.brake);
     if (const double limit = options.rig.brake.brake_rate_limit_Nm_s; limit > 0.0) plant.brake_limit_Nm_s = limit;
+    plant.brake_release_ratio = options.brake_flaws.release_ratio;
     plant.motor_stall_Nm = options.rig.motor.stall_torque_Nm;
     plant.motor_no_load_rad_s = options.rig.motor.no_load_speed_rad_s;
     plant.max_step_s = options.max_step_s;

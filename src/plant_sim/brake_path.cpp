@@ -1,4 +1,4 @@
-// Dead time, hysteresis and fading of the brake.
+// Dead time, curved map, fading and hysteresis of the brake.
 #include "plant_sim/brake_path.hpp"
 
 #include <algorithm>
@@ -16,10 +16,13 @@ constexpr double due_rounding_s = 1e-11;
 
 }  // namespace
 
-BrakePath::BrakePath(const BrakeFlaws& flaws, bool ideal_actuator)
+BrakePath::BrakePath(const BrakeFlaws& flaws, double full_Nm, bool ideal_actuator)
     : dead_time_s_(flaws.dead_time_s),
       hysteresis_(ideal_actuator ? 0.0 : flaws.hysteresis),
       fading_per_J_(ideal_actuator ? 0.0 : flaws.fading_per_J),
+      curvature_(ideal_actuator || !(full_Nm > 0.0) ? 0.0 : flaws.curvature),
+      full_Nm_(full_Nm),
+      release_ratio_(ideal_actuator ? 1.0 : flaws.release_ratio),
       changes_(!ideal_actuator && flaws.dead_time_s > 0.0 ? changes_most : 0) {}
 
 void BrakePath::start() noexcept {

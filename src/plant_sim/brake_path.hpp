@@ -9,14 +9,17 @@
 
 namespace abs_hil::plant_sim {
 
-/// What a real brake does to its command before the lag (6): dead time, fading by the energy it has taken, and the
-/// hysteresis of a cable. Real-time safe except for the constructor.
+/// What a real brake does to its command before the lag (6): dead time, a curved map, fading by the energy it has
+/// taken, and the hysteresis of a cable; and by how much faster it lets go. Real-time safe except for the constructor.
 class BrakePath {
  public:
-  BrakePath(const BrakeFlaws& flaws, bool ideal_actuator);
+  /// @param full_Nm  b(1)
+  BrakePath(const BrakeFlaws& flaws, double full_Nm, bool ideal_actuator);
 
   /// False if the duty acts at once and gives b(u); then the calls below are unnecessary.
-  [[nodiscard]] bool any() const noexcept { return delays() || fades() || hysteresis_ > 0.0; }
+  [[nodiscard]] bool any() const noexcept {
+    return delays() || fades() || hysteresis_ > 0.0 || curvature_ != 0.0 || release_ratio_ != 1.0;
+  }
   /// Returns to a cold brake that has long been released.
   void start() noexcept;
   /// Stores the duty that is sent from now on.
@@ -26,8 +29,17 @@ class BrakePath {
   /// Length of the next part under one duty: `left_s` > 0, but only up to the next change, and at most `max_step_s`
   /// while the brake fades.
   [[nodiscard]] double part_s(double left_s, double max_step_s) const noexcept;
-  /// The torque that the lag approaches within a part: b(u) of the duty, less what fading and hysteresis take.
-  /// @param static_Nm  b(u) of the duty
+  /// The torque at which a map that is no straight line holds the brake.
+  /// @param straight_Nm  b(u) of the duty
+  [[nodiscard]] double curved_Nm(double straight_Nm) const noexcept {
+    return straight_Nm * (1.0 + curvature_ * (straight_Nm / full_Nm_ - 1.0));
+  }
+  /// Factor over c31 within a part. The torque approaches its target from one side.
+  [[nodiscard]] double lag_factor(double target_Nm, double torque_Nm) const noexcept {
+    return target_Nm < torque_Nm ? release_ratio_ : 1.0;
+  }
+  /// The torque that the lag approaches within a part, less what fading and hysteresis take.
+  /// @param static_Nm  `curved_Nm` of the duty, times its drift
   /// @param power_W  of the brake at the part's start
   [[nodiscard]] double transmitted_Nm(double static_Nm, double part_s, double power_W) noexcept;
   /// Advances the time by one part.
@@ -52,6 +64,9 @@ class BrakePath {
   double dead_time_s_;
   double hysteresis_;
   double fading_per_J_;
+  double curvature_;
+  double full_Nm_;
+  double release_ratio_;
   std::vector<Change> changes_;  ///< a ring of the changes on their way; empty: without dead time
   std::size_t first_{0};
   std::size_t count_{0};

@@ -23,6 +23,7 @@ BasicIntecoMu<S>::BasicIntecoMu(const PlantOptions& options)
       a_(options.inteco_mu.a),
       p_(options.inteco_mu.p),
       regularisation_m_s_(options.slip_regularisation_m_s),
+      fall_s_m_(options.friction_fall_s_m),
       peak_mu_(highest()) {
   if (!(peak_mu_ > 0.0)) {
     throw std::invalid_argument(

@@ -30,7 +30,8 @@ Plant::Plant(const PlantOptions& options)
       profile_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
       drift_(options.drift),
       model_(options, profile_.profile().highest()) {
-  auto path = std::make_unique<BrakePath>(options_.brake_flaws, options_.ideal_actuator);
+  auto path = std::make_unique<BrakePath>(options_.brake_flaws, rig::brake_torque_at(options_.rig.brake, 1.0),
+                                          options_.ideal_actuator);
   if (path->any()) brake_path_ = std::move(path);
   let_bearings_drift(drift_.after(0.0));
 }
@@ -128,7 +129,7 @@ void Plant::advance_in_parts(const Torques& held, double duration_s, const State
     HeldTorques now = held;
     if (brake_path_) {
       part_s = brake_path_->part_s(part_s, options_.max_step_s);
-      now.brake_target_Nm = rig::brake_torque_at(options_.rig.brake, brake_path_->duty());
+      now.brake_target_Nm = brake_path_->curved_Nm(rig::brake_torque_at(options_.rig.brake, brake_path_->duty()));
     }
     if (drift_.any()) {
       const DriftFactors factors = drift_.after(0.5 * part_s);
@@ -136,7 +137,10 @@ void Plant::advance_in_parts(const Torques& held, double duration_s, const State
       now = drifted(now, factors);
     }
     const double power_W = brake_power_W();
-    if (brake_path_) now.brake_target_Nm = brake_path_->transmitted_Nm(now.brake_target_Nm, part_s, power_W);
+    if (brake_path_) {
+      now.brake_target_Nm = brake_path_->transmitted_Nm(now.brake_target_Nm, part_s, power_W);
+      now.brake_rate_per_s *= brake_path_->lag_factor(now.brake_target_Nm, x[brake_torque]);
+    }
     go_on(now, part_s);
     left_s -= part_s;
     if (brake_path_) brake_path_->pass(part_s, 0.5 * part_s * (power_W + brake_power_W()));

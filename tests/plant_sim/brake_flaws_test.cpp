@@ -168,6 +168,38 @@ TEST_CASE("A brake fades by the energy that it has taken from its wheel") {
   CHECK_THAT(plant.state().brake_torque_Nm, WithinRel(T0, 1e-2));  // cold again
 }
 
+TEST_CASE("A brake lets go at a rate of its own, within the limit of its rate and after the dead time too") {
+  PlantOptions options = endless_wheel();
+  const double ratio = GENERATE(0.5, 1.0, 1.8);
+  options.brake_flaws.release_ratio = ratio;
+  const double dead_s = GENERATE(0.0, 0.0123);
+  options.brake_flaws.dead_time_s = dead_s;
+  const double c = options.rig.brake.c31_per_s;
+  const double high_Nm = static_Nm(options, 0.8);
+  const double low_Nm = static_Nm(options, 0.5);
+  Plant plant(options);
+  plant.reset(rolling_at_170);
+  const double risen_Nm = torque_after(plant, 0.03, 1e-3, 0.8);
+  CHECK_THAT(risen_Nm, WithinRel(high_Nm * (1.0 - std::exp(-c * (0.03 - dead_s))), 1e-9));
+  const double held_Nm = torque_after(plant, 3.0, 1e-3, 0.8);
+  const double fallen_Nm = torque_after(plant, 0.04, 1e-3, 0.5);
+  CHECK_THAT(fallen_Nm, WithinRel(low_Nm + (held_Nm - low_Nm) * std::exp(-ratio * c * (0.04 - dead_s)), 1e-9));
+}
+
+TEST_CASE("A curved map has the torque of the straight one at duty 1, and its share less near 0") {
+  PlantOptions options = endless_wheel();
+  options.rig.brake.u0 = 0.0;
+  options.rig.brake.b2_Nm = 0.0;
+  const double k = GENERATE(-0.4, 0.3);
+  options.brake_flaws.curvature = k;
+  Plant plant(options);
+  for (const double duty : {1e-6, 0.5, 1.0}) {
+    plant.reset({.omega1_rad_s = 1e6, .omega2_rad_s = 1e6});
+    CHECK_THAT(torque_after(plant, 3.0, 0.1, duty),
+               WithinRel(static_Nm(options, duty) * (1.0 - k * (1.0 - duty)), 1e-9));
+  }
+}
+
 TEST_CASE("A copy of a plant has a brake of its own, with what is under way in it") {
   PlantOptions options = endless_wheel();
   options.brake_flaws.dead_time_s = 0.05;
@@ -190,7 +222,8 @@ TEST_CASE("An ideal actuator has no flaws") {
   PlantOptions options = endless_wheel();
   options.ideal_actuator = true;
   options.rig.brake.brake_rate_limit_Nm_s = 1.0;
-  options.brake_flaws = {.dead_time_s = 0.1, .hysteresis = 0.3, .fading_per_J = 0.01};
+  options.brake_flaws = {
+      .dead_time_s = 0.1, .hysteresis = 0.3, .fading_per_J = 0.01, .curvature = 0.5, .release_ratio = 3.0};
   Plant plant(options);
   plant.reset(rolling_at_170);
   plant.advance(0.01, {.brake_torque_Nm = 3.0});

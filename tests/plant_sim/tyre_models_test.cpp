@@ -65,12 +65,13 @@ TEST_CASE("Friction is 0 where the published polynomial would drive") {
 TEST_CASE("No tyre rises more steeply than its bound, and the bound is nearly reached") {
   PlantOptions options = inteco_manual();
   options.tyre = GENERATE("magic-formula", "inteco-mu");
+  options.friction_fall_s_m = GENERATE(0.0, 0.02);
   const TyreModel model = make_tyre_model(options);
   const double v_x = GENERATE(16.8, 1.0, 0.005);
   INFO(options.tyre << " at " << v_x << " m/s");
   std::visit(
       [&](const auto& tyre) {
-        const auto shape = [&](double v_w) { return tyre.shape(tyre.slip(v_w, v_x)); };
+        const auto shape = [&](double v_w) { return tyre.shape_at(v_w, v_x); };
         double share = 0.0;
         for (int i = -4000; i <= 8000; ++i) {
           const double v_w = v_x * i / 4000.0;
@@ -82,6 +83,19 @@ TEST_CASE("No tyre rises more steeply than its bound, and the bound is nearly re
         CHECK(share > 0.9);
       },
       model);
+}
+
+TEST_CASE("Friction falls with the sliding speed, down to none") {
+  PlantOptions options = inteco_manual();
+  options.tyre = GENERATE("magic-formula", "inteco-mu");
+  options.friction_fall_s_m = 0.05;
+  std::visit(
+      [](const auto& tyre) {
+        CHECK_THAT(tyre.shape_at(4.0, 10.0), WithinRel(0.7 * tyre.shape(tyre.slip(4.0, 10.0)), 1e-12));
+        CHECK_THAT(tyre.shape_at(10.0, 4.0), WithinRel(0.7 * tyre.shape(tyre.slip(10.0, 4.0)), 1e-12));
+        CHECK(tyre.shape_at(-15.0, 10.0) == 0.0);
+      },
+      make_tyre_model(options));
 }
 
 TEST_CASE("A curve that is nowhere positive and an unknown tyre are refused") {

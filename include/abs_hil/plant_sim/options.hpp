@@ -69,6 +69,12 @@ struct BrakeFlaws {
   ABS_HIL_OPTION(double, fading_per_J, 0.0, .unit = "1/J",
                  .meaning = "simulation: share of the brake torque lost per joule that the brake has taken",
                  .range = rig::from_zero(0.1));
+  ABS_HIL_OPTION(double, curvature, 0.0,
+                 .meaning = "simulation: share of b(u) that a small torque lacks; none at duty 1",
+                 .range = rig::between(-0.9, 0.9));
+  ABS_HIL_OPTION(double, release_ratio, 1.0,
+                 .meaning = "simulation: how many times faster the brake lets go than it takes hold",
+                 .range = rig::between(0.1, 10));
 };
 
 /// What a real encoder does beside its steps and its eccentricity (docs/plants.md).
@@ -109,6 +115,9 @@ struct PlantOptions {
   /// See FactorProfile; empty: none.
   ABS_HIL_OPTION(std::string, friction_profile, "",
                  .meaning = "simulation: friction over time or distance (docs/plants.md)");
+  ABS_HIL_OPTION(double, friction_fall_s_m, 0.0, .unit = "s/m",
+                 .meaning = "simulation: share of the friction lost per m/s of sliding speed",
+                 .range = rig::from_zero(0.05));
   ABS_HIL_GROUP(DriftProfiles, drift, "", {});
   ABS_HIL_GROUP(BrakeFlaws, brake_flaws, "brake_", {});
   /// The drivers of the boards have a cap of their own, 0.7 by default.

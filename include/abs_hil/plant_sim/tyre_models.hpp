@@ -9,8 +9,15 @@
 
 // Friction curves. Each computes the slip by its own definition from the circumferential speeds, the friction
 // coefficient relative to its peak ("shape": odd in the slip, at most 1), and bounds on it. All functions are real-time
-// safe except for the constructors.
+// safe except for the constructors. Friction may fall with the sliding speed: the shape of these speeds has the factor
+// 1 - k |v_x - v_wheel|, at least 0, with k of plant.friction_fall_s_m.
 namespace abs_hil::plant_sim {
+
+template <class S>
+[[nodiscard, gnu::always_inline]] inline S sliding_factor(const S& fall_s_m, const S& v_wheel_m_s,
+                                                          const S& v_x_m_s) noexcept {
+  return rig::larger(S(0.0), S(1.0 - fall_s_m * rig::magnitude(S(v_x_m_s - v_wheel_m_s))));
+}
 
 /// The paper's curve (4): sin(C atan(B slip)), slip (5). `S` is a `double`, or a pack of them (rig/scalar.hpp).
 template <class S>
@@ -21,6 +28,7 @@ class BasicMagicFormula {
       : B_(options.rig.tyre.B),
         C_(options.rig.tyre.C),
         regularisation_m_s_(options.slip_regularisation_m_s),
+        fall_s_m_(options.friction_fall_s_m),
         peak_mu_(options.mu_peak) {}
 
   [[nodiscard]] S slip(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
@@ -30,20 +38,22 @@ class BasicMagicFormula {
   /// `shape` of the slip at these speeds, with one division for slip and arctangent.
   [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
     return rig::magic_formula(C_, S(B_ * (v_x_m_s - v_wheel_m_s)),
-                              rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_));
+                              rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_)) *
+           sliding_factor(fall_s_m_, v_wheel_m_s, v_x_m_s);
   }
   /// Friction coefficient at the peak of the curve.
   [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
-  /// Upper bound on the slope of `shape` over v_x - v_wheel at these speeds, s/m: its slope B C at slip 0 over the
-  /// speed.
+  /// Upper bound on the slope of `shape_at` over v_x - v_wheel, s/m: the slope B C at slip 0 over the speed, and that
+  /// of the fall.
   [[nodiscard]] S steepest_s_m(const S& /*v_wheel_m_s*/, const S& v_x_m_s) const noexcept {
-    return B_ * C_ / rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_);
+    return B_ * C_ / rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_) + fall_s_m_;
   }
 
  private:
   S B_{0.0};
   S C_{0.0};
   S regularisation_m_s_{0.0};
+  S fall_s_m_{0.0};
   S peak_mu_{0.0};
 };
 using MagicFormula = BasicMagicFormula<double>;
@@ -69,11 +79,11 @@ class BasicIntecoMu {
     return rig::with_sign(S(rig::larger(S(0.0), friction_coefficient(s)) / peak_mu_), slip);
   }
   [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
-    return shape(slip(v_wheel_m_s, v_x_m_s));
+    return shape(slip(v_wheel_m_s, v_x_m_s)) * sliding_factor(fall_s_m_, v_wheel_m_s, v_x_m_s);
   }
   [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
   [[nodiscard]] S steepest_s_m(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
-    return steepest_shape_ / larger_speed_m_s(v_wheel_m_s, v_x_m_s);
+    return steepest_shape_ / larger_speed_m_s(v_wheel_m_s, v_x_m_s) + fall_s_m_;
   }
 
  private:
@@ -92,6 +102,7 @@ class BasicIntecoMu {
 
   S w1_{0.0}, w2_{0.0}, w3_{0.0}, w4_{0.0}, a_{0.0}, p_{0.0};  ///< IntecoMuParameters
   S regularisation_m_s_{0.0};
+  S fall_s_m_{0.0};
   S peak_mu_{0.0};
   S steepest_shape_{0.0};  ///< upper bound on the slope of `shape` over the slip
 };

@@ -1,22 +1,24 @@
 """The brake's torque, and flaws of the brake that the plant has (docs/plants.md) and that are fitted where the logs show them.
 
-Dead time d, fading k and hysteresis h change the torque that the duty u asks for, before the lag (6):
+Dead time d, curvature c, fading k and hysteresis h change the torque that the duty u asks for, before the lag (6):
 
     b(t)    static torque of u(t - d) by (7)
-    f(t)    b exp(-k E),  E the energy that the brake has taken since the log began, J
+    m(t)    b (1 + c (b / b(1) - 1))
+    f(t)    m exp(-k E),  E the energy that the brake has taken since the log began, J
     y(t)    f pulls y along only from outside of (1 - h) f ... (1 + h) f
 
 The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. How its readings change
-with k and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`.
+with c, k and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`. The
+lag itself has the rate c31, times the release ratio where the torque falls.
 """
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import scipy.signal
 
 from .logs import Log, Motion
-from .parameters import DEAD_TIME, FADING, FLAWS, HYSTERESIS, RATE_LIMIT
+from .parameters import CURVATURE, DEAD_TIME, FADING, FLAWS, HYSTERESIS, RATE_LIMIT, RELEASE
 
 
 def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
@@ -24,12 +26,15 @@ def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
     static = static_torques(log, values)
     keeps = float(np.exp(-values['c31_per_s'] * log.period_s))
     limit = values.get(RATE_LIMIT.key, 0.0) * log.period_s
-    if limit == 0.0:
+    release = values.get(RELEASE.key, RELEASE.none)
+    if limit == 0.0 and release == 1.0:
         return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static))
-    torque = np.zeros(len(static))
-    for i in range(len(static) - 1):
-        torque[i + 1] = torque[i] + min(max((1.0 - keeps) * (static[i] - torque[i]), -limit), limit)
-    return torque
+    limit, grips, lets_go = limit or np.inf, 1.0 - keeps, 1.0 - keeps**release
+    torque = [0.0]
+    for target in static[:-1].tolist():
+        gap = target - torque[-1]
+        torque.append(torque[-1] + min(max((grips if gap > 0.0 else lets_go) * gap, -limit), limit))
+    return np.array(torque)
 
 
 def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
@@ -40,7 +45,7 @@ def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
 
 def act(values: Mapping[str, float]) -> bool:
     """Whether there are flaws, on a map that has a duty for each torque from 0 up."""
-    return any(values.get(flaw.key, 0.0) for flaw in FLAWS) and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
+    return any(values.get(flaw.key, 0.0) for flaw in FLAWS if flaw.acts == 'flaw') and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
 
 
 def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:
@@ -48,7 +53,9 @@ def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[L
     below which a brake with flaws may well hold."""
     if not act(values):
         return log, values
-    target = _late(log, static_torques(log, values), values.get(DEAD_TIME.key, 0.0))
+    target = static_torques(log, values)
+    target = target * (1.0 + values.get(CURVATURE.key, 0.0) * (target / full_Nm(values) - 1.0))
+    target = _late(log, target, values.get(DEAD_TIME.key, 0.0))
     if fading := values.get(FADING.key, 0.0):
         asked = target
         for _ in range(3):  # the energy depends on the fading, weakly
@@ -58,12 +65,20 @@ def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[L
     return _asking(log, target, values), {**values, 'u0': 0.0}
 
 
-def amounts(log: Log, motion: Motion, values: Mapping[str, float]) -> dict[str, np.ndarray]:
-    """Of log and values as `with_flaws` gives them, at each row: by how much the torque's factor grows with k and h, and
-    whether the brake alone acts, so that a delay of the inputs is a dead time."""
-    static = static_torques(log, values)
-    alone = (log.motor_pwm == 0.0) & (static + brake_torques(log, values) > 0.0)
-    return {FADING.key: -energy_J(log, motion, values), HYSTERESIS.key: fallen(static), DEAD_TIME.key: alone.astype(float)}
+def amounts(log: Log, motion: Motion, values: Mapping[str, float], flaws: Collection[str]) -> dict[str, np.ndarray]:
+    """Of log and values as `with_flaws` gives them, at each row, for those of `flaws` that act on the duties: by how much
+    the torque's factor grows with c, k and h, and whether the brake alone acts, so that a delay of the inputs is a dead
+    time."""
+    static, torque = static_torques(log, values), brake_torques(log, values)
+    grows = {FADING.key: lambda: -energy_J(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
+             CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
+             DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
+    return {key: of() for key, of in grows.items() if key in flaws}
+
+
+def full_Nm(values: Mapping[str, float]) -> float:
+    """b(1)."""
+    return max(values['b1_Nm'] + values['b2_Nm'], 1e-9)
 
 
 def energy_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:

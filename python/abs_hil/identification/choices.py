@@ -6,9 +6,9 @@ import numpy as np
 
 from .brake_flaws import brake_torques, static_torques
 from .fit import ROUNDS, finish_fit, other_costs
-from .linear import keep_normals, linearise, run_filter, solved, step, to_rest
+from .linear import keep_normals, left_out_cost, linearise, run_filter, solved, step, to_rest
 from .logs import Log
-from .parameters import DELAY, RATE_LIMIT, disc_of
+from .parameters import DELAY, RATE_LIMIT
 from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit
 
 #: a delay is believed if it is this many standard deviations from 0
@@ -31,12 +31,12 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
                 notes: list[str]) -> tuple[Fit, bool]:
     """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
     are enough if they show a clear difference already. False: the logs do not tell, and the form is the start's."""
-    costs = [_cross_validated(fit) for fit in fits]
+    costs = [left_out_cost(fit) for fit in fits]
     if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
         for number, fit in enumerate(fits):
             for _ in range(2):
                 step(fit, ROUNDS[1][0], check)
-            costs[number] = _cross_validated(fit)
+            costs[number] = left_out_cost(fit)
         follow = [_follows(fit, check) for fit in fits] if abs(costs[0] - costs[1]) > CLEAR_DIFFERENCE else []
         if sum(follow) == 1:
             best = follow.index(True)
@@ -59,22 +59,6 @@ def _follows(fit: Fit, check: Callable[[], None]) -> bool:
         return finish_fit(fit.copy(), check).rms_counts <= LARGEST_QUIET_RMS
     except (ValueError, np.linalg.LinAlgError):
         return False
-
-
-def _cross_validated(fit: Fit) -> float:
-    N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
-    if len(fit.normal) == 1:
-        return float(fit.cost.sum() - n @ solved(fit, N, n))
-    total = 0.0
-    keys = fit.keys
-    for log, (Nl, nl, cl) in enumerate(zip(fit.normal, fit.right, fit.cost)):
-        x = solved(fit, N - Nl, n - nl)
-        # Where its counters began, only the log itself can tell.
-        own = [keys.index(p.key) for wheel in fit.problem.discs for p in disc_of(wheel, log)]
-        x[own] = 0.0
-        x[own] = np.linalg.solve(Nl[np.ix_(own, own)] + 1e-9 * np.eye(len(own)), nl[own] - Nl[own] @ x)
-        total += float(cl - 2 * nl @ x + x @ Nl @ x)
-    return total
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:

@@ -162,7 +162,7 @@ def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check:
 
 
 def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
-    """The fit with the flaws of the brake that it shows while small disturbances are allowed: those that the likelihood asks
+    """The fit with the flaws that it shows while small disturbances are allowed: those that the likelihood asks
     for would take the flaws up. With the causes that are left, and -2 log likelihood with the surest of them."""
     disturbances = ROUNDS[1][0]
     near = choices.without(fit)  # a limit that was found may stand for a flaw

@@ -49,7 +49,7 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
         if DEAD_TIME.key in problem.flaws:  # the derivative by a delay of the brake alone
             later = {**values, DELAY: values.get(DELAY, 0.0) + 1e-5}
             moved.append((problem.plant_values(later, number), 1e-5, 'brake'))
-        amount = amounts(log, problem.motions[number], brake) if problem.flaws else {}
+        amount = amounts(log, problem.motions[number], brake, problem.flaws)
         for piece in pieces:
             if piece.log != number:
                 continue
@@ -79,7 +79,7 @@ def _by_flaws(problem: Problem, values: Mapping[str, float], scale: np.ndarray, 
     keys = [p.key for p in problem.parameters]
     torque = _relative(problem, values, scale)[BRAKE_FACTOR, piece.columns]
     lengths = np.diff(piece.first)
-    for key in problem.flaws:
+    for key in amount:
         column = int(np.flatnonzero(piece.columns == keys.index(key))[0])
         share = scale[keys.index(key)] * by_windows(piece, amount[key])
         for name, of in (('by_parameter', np.repeat(share, lengths)), ('end_by_parameter', share)):
@@ -276,6 +276,24 @@ def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray
         fit.right[piece.log] += right[:, 0]
         fit.cost[piece.log] += square[0] + log_variance
     return fit.normal.sum(axis=0), fit.right.sum(axis=0)
+
+
+def left_out_cost(fit: Fit) -> float:
+    """-2 log likelihood but for a constant of each log by what all the others tell, or of the only one. Needs the
+    normal equations of the last step or of `keep_normals`."""
+    N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
+    if len(fit.normal) == 1:
+        return float(fit.cost.sum() - n @ solved(fit, N, n))
+    total = 0.0
+    keys = fit.keys
+    for log, (Nl, nl, cl) in enumerate(zip(fit.normal, fit.right, fit.cost)):
+        x = solved(fit, N - Nl, n - nl)
+        # Where its counters began, only the log itself can tell.
+        own = [keys.index(p.key) for wheel in fit.problem.discs for p in disc_of(wheel, log)]
+        x[own] = 0.0
+        x[own] = np.linalg.solve(Nl[np.ix_(own, own)] + 1e-9 * np.eye(len(own)), nl[own] - Nl[own] @ x)
+        total += float(cl - 2 * nl @ x + x @ Nl @ x)
+    return total
 
 
 def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:

@@ -17,7 +17,8 @@ DELAY = 'delay_s'
 class Parameter:
     """A number of the plant: its key without "plant."; `acts` says when it matters (python/src/identification.cpp);
     `floor` is the least size that a step relates to, for those that may be 0; `cure` is what would tell it; `prior` is the
-    relative standard deviation of the first value, which decides only what the logs do not."""
+    relative standard deviation of the first value, which decides only what the logs do not; `none` is the value of a flaw
+    that is not there."""
     key: str
     unit: str
     acts: str
@@ -26,6 +27,7 @@ class Parameter:
     least: float = 0.0
     most: float = np.inf
     prior: float = 0.7
+    none: float = 0.0
 
 
 _SHARED = (
@@ -55,11 +57,15 @@ _LEVER = (
 )
 #: the fastest change of the brake's torque; fitted where the logs show one
 RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop or pulses', least=0.5, most=9e5)
-#: flaws of the brake (brake_flaws.py); fitted where the logs show them. The prior is wide: it must not hold them at 0
+#: flaws of brake and tyre; fitted where the logs show them (structure.py). The prior is wide: it must not hold them at
+#: `none`. Those that act as "flaw" change the duties that the fit simulates (brake_flaws.py), the others its plant
 FADING = Parameter('brake_fading_per_J', '1/J', 'flaw', '', floor=1e-4, most=0.1, prior=20.0)
 HYSTERESIS = Parameter('brake_hysteresis', '1', 'flaw', '', floor=0.05, most=0.5, prior=20.0)
 DEAD_TIME = Parameter('brake_dead_time_s', 's', 'flaw', '', floor=1e-3, most=0.05, prior=20.0)
-FLAWS = (FADING, HYSTERESIS, DEAD_TIME)
+CURVATURE = Parameter('brake_curvature', '1', 'flaw', '', floor=0.05, least=-0.9, most=0.9, prior=20.0)
+RELEASE = Parameter('brake_release_ratio', '1', 'brake', '', least=0.1, most=10.0, prior=20.0, none=1.0)
+FRICTION_FALL = Parameter('friction_fall_s_m', 's/m', 'contact', '', floor=1e-3, most=0.05, prior=20.0)
+FLAWS = (FADING, HYSTERESIS, DEAD_TIME, CURVATURE, RELEASE, FRICTION_FALL)
 WHEELS = ('upper', 'lower')
 
 
@@ -112,9 +118,8 @@ def base_options(form: Form, start: PathLike) -> Any:
     """The start plant in this form, without what a log does not know: profiles of friction and drift."""
     given: dict[str, Any] = {**form.settings, 'plant.friction_profile': '', 'plant.ideal_actuator': False,
                              'plant.ideal_sensors': False, 'plant.max_step_s': 1e-3}
-    # Flaws of brake and encoders that are estimated, or that no form of the plant has.
-    given.update({f'plant.{key}': 0.0 for key in (
-        'brake_rate_limit_Nm_s', 'brake_dead_time_s', 'brake_hysteresis', 'brake_fading_per_J', 'encoder_eccentricity_rad')})
+    # Flaws of brake, tyre and encoders that are estimated, or that no form of the plant has.
+    given.update({f'plant.{flaw.key}': flaw.none for flaw in (RATE_LIMIT, *FLAWS)} | {'plant.encoder_eccentricity_rad': 0.0})
     for wheel in WHEELS:
         given.update({f'plant.{wheel}_encoder_{flaw}': 0 for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts',
                                                                       'lost_counts')})

@@ -11,7 +11,7 @@ from ..core import _core
 from ..options import options
 from .brake_flaws import act, brake_torques, with_flaws
 from .logs import Log, Motion, motion_of, segments_of
-from .parameters import DELAY, FLAWS, RATE_LIMIT, Form, Parameter, base_options, disc_of
+from .parameters import DELAY, FLAWS, FRICTION_FALL, RATE_LIMIT, RELEASE, Form, Parameter, base_options, disc_of
 
 #: an even distribution within one count, counts^2
 COUNT_VARIANCE = 1 / 12
@@ -60,7 +60,7 @@ class Piece:
 @dataclass
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
-    keys of the brake's flaws that are fitted."""
+    keys of the flaws that are fitted."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -115,8 +115,8 @@ class Problem:
         scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
                   for p in self.form.parameters if p.key != 'u0']
         scaled.append(('u0', 0.0 if act(values) else values['u0']))
-        return [*self.given.items(), *scaled, (RATE_LIMIT.key, values.get(RATE_LIMIT.key, 0.0)),
-                (DELAY, values.get(DELAY, 0.0))]
+        return [*self.given.items(), *scaled, (DELAY, values.get(DELAY, 0.0)),
+                *((flaw.key, values.get(flaw.key, flaw.none)) for flaw in (RATE_LIMIT, RELEASE, FRICTION_FALL))]
 
     def flawed(self, log: int, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:
         """A log with the duties that a brake without flaws would need, and the values of that (brake_flaws.py)."""

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .brake_flaws import amounts, brake_torques, fallen, static_torques
-from .linear import _relative, by_windows, linearise, to_rest
-from .parameters import DEAD_TIME, DELAY, FADING, HYSTERESIS
+from .brake_flaws import amounts, brake_torques, fallen, full_Nm, static_torques
+from .linear import _relative, by_windows, keep_normals, left_out_cost, linearise, run_filter, to_rest
+from .parameters import CURVATURE, DEAD_TIME, DELAY, FADING, FRICTION_FALL, HYSTERESIS, RELEASE
 from .problem import DISTURBANCES, Disturbances, Fit, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
@@ -30,7 +30,7 @@ class Signals:
     """What a cause may follow, at each row of a log."""
     torque_Nm: np.ndarray
     static_Nm: np.ndarray
-    most_Nm: float
+    full_Nm: float
     energy_J: np.ndarray
     omega_rad_s: np.ndarray
     angle_rad: np.ndarray
@@ -43,7 +43,7 @@ class Signals:
 class Cause:
     """words, against: what a positive and a negative coefficient mean; acts: the disturbance that it would be
     (problem.DISTURBANCES), or the parameter; follows: what that would follow, at each row, in `unit`; flaw: the parameter of
-    the plant that describes it, if there is one."""
+    the plant that describes it, if there is one: its value is `none` plus the coefficient."""
     words: str
     unit: str
     acts: str
@@ -59,11 +59,12 @@ CAUSES = (
           HYSTERESIS.key, 'the brake holds less after its duty fell than after it rose'),
     Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key, 'the brake acts early'),
     Cause('the brake lets go faster than it takes hold', 'of its lag', 'c31_per_s',
-          lambda s: (s.static_Nm < s.torque_Nm).astype(float), against='the brake lets go more slowly than it takes hold'),
-    Cause("the brake's torque is no straight line of its duty", 'of its torque at the largest', 'brake',
-          lambda s: s.static_Nm / s.most_Nm),
+          lambda s: (s.static_Nm < s.torque_Nm).astype(float), RELEASE.key, 'the brake lets go more slowly than it takes hold'),
+    Cause("the brake's torque is no straight line of its duty", 'of b(u) at small torques', 'brake',
+          lambda s: s.static_Nm / s.full_Nm - 1.0, CURVATURE.key),
     Cause("the brake's torque changes with the upper wheel's speed", 'per rad/s', 'brake', lambda s: s.omega_rad_s[:, 0]),
-    Cause('the friction changes with the sliding speed', 'per m/s', 'road', lambda s: s.sliding_m_s),
+    Cause('the friction falls with the sliding speed', 'per m/s', 'road', lambda s: -s.sliding_m_s, FRICTION_FALL.key,
+          'the friction rises with the sliding speed'),
     Cause("the friction changes with the lower wheel's speed", 'per rad/s', 'road', lambda s: s.omega_rad_s[:, 1]),
     Cause('the friction changes with time', 'per s', 'road', lambda s: s.time_s),
     Cause("the friction follows the lower wheel's angle", 'at the sine', 'road', lambda s: np.sin(s.angle_rad[:, 1])),
@@ -123,15 +124,14 @@ def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
 def _signals(fit: Fit) -> list[Signals]:
     """Of each log."""
     problem, values = fit.problem, fit.values
-    most_Nm = max(max(float(static_torques(log, values).max()) for log in problem.logs), 1e-9)
     out = []
     for number, motion in enumerate(problem.motions):
         log, brake = problem.flawed(number, values)
         torque, static = brake_torques(log, brake), static_torques(log, brake)
         omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
         sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
-        flaws = amounts(log, motion, brake)
-        out.append(Signals(torque, static, most_Nm, -flaws[FADING.key], omega, motion.smooth_rad, sliding,
+        flaws = amounts(log, motion, brake, (FADING.key, DEAD_TIME.key))
+        out.append(Signals(torque, static, full_Nm(brake), -flaws[FADING.key], omega, motion.smooth_rad, sliding,
                            flaws[DEAD_TIME.key], log.time_s - log.time_s[0]))
     return out
 
@@ -169,7 +169,7 @@ def _normals(fit: Fit, disturbances: Disturbances, causes: Sequence[Cause]) -> t
 
 def explained(fit: Fit, disturbances: Disturbances, check: Callable[[], None],
               say: Callable[[str], None]) -> tuple[Fit, list[Found]]:
-    """The fit with those flaws of the brake that explain what the disturbances have in common, and the causes that are left,
+    """The fit with those flaws that explain what the disturbances have in common, and the causes that are left,
     surest first: none of them is in the plant."""
     while True:
         check()
@@ -186,7 +186,7 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
                  check: Callable[[], None]) -> tuple[Fit, Cause] | None:
     surest = causes[0]
     for one in causes:
-        if not one.cause.flaw or not one.coefficient > 0.0 or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
+        if not one.cause.flaw or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
             continue
         flawed = _with_flaw(fit, one, disturbances, check)
         if flawed is None:
@@ -198,15 +198,23 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
 
 
 def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
-    """The fit with one more flaw; None if it is not there after all."""
+    """The fit with one more flaw; None if it is not there after all: of another sign, not sure, or no help in predicting each
+    log from the others."""
     key = found.cause.flaw
     problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
     at = [p.key for p in problem.parameters].index(key)
-    value = min(found.coefficient, 0.9 * problem.parameters[at].most)
+    flaw = problem.parameters[at]
+    value = flaw.none + found.coefficient
+    if not flaw.least < value:
+        return None
+    value = min(value, 0.9 * flaw.most)
     flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
     to_rest(flawed, disturbances, 6, check)
     sd = float(np.sqrt(flawed.covariance()[at, at]) * flawed.scale[at])
-    return flawed if flawed.values[key] > SURE * sd else None
+    if not abs(flawed.values[key] - flaw.none) > SURE * sd:
+        return None
+    keep_normals(fit, run_filter(fit, disturbances)[1])
+    return flawed if left_out_cost(flawed) < left_out_cost(fit) else None
 
 
 def sentence(causes: Sequence[Found], fit: Fit) -> str:

@@ -30,7 +30,8 @@ def optimum(plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = 
     knows_road: False: knows the tyre and the present friction and takes it to last (causal). True: knows the whole road.
     known: with knows_road, a braking on the same road that has been found already.
 
-    Dead time, hysteresis and fading of the brake are left out, which can only shorten the distance: a bound it stays.
+    Dead time, hysteresis and fading of the brake are left out, and that friction falls with the sliding speed. All can only
+    lengthen the distance: a bound it stays.
     Raises ValueError for speeds outside (0, 1000] rad/s and below the start speed, NoOptimum if the solver fails.
     """
     rig = Rig.of(plant=plant, set=set)

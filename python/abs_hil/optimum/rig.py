@@ -20,7 +20,7 @@ SLIP, OMEGA2, TORQUE, DISTANCE = range(4)
 @dataclass(frozen=True)
 class Rig:
     """Both wheels in contact: the lower one turns forwards, the upper one turns forwards or stands. The brake is without dead
-    time, hysteresis and fading.
+    time, curved map, hysteresis and fading, and friction does not fall with the sliding speed.
 
     values: of the plant.  brake_duty_max: the limit of gate and plant, which no command passes.
     """
@@ -121,6 +121,8 @@ class Rig:
     def torque_rate_Nm_s(self, x: Any, command_Nm: Any) -> Any:
         """The brake's answer to a commanded torque: the lag, limited to the brake's rate."""
         rate = self['c31_per_s'] * (command_Nm - x[TORQUE])
+        if (release := self.values.get('brake_release_ratio', 1.0)) != 1.0:
+            rate *= ca.if_else(command_Nm < x[TORQUE], release, 1.0)
         return ca.fmin(ca.fmax(rate, -self.rate_limit_Nm_s), self.rate_limit_Nm_s) if self.limited else rate
 
     def wheel_rates(self, x: Any, force_N: Any) -> tuple[Any, Any]:

@@ -22,6 +22,7 @@ struct LanePlant {
   BasicWheels<S> wheels{};
   rig::BasicBrake<S> brake{};
   S brake_limit_Nm_s{std::numeric_limits<double>::infinity()};
+  S brake_release_ratio{1.0};
   S motor_stall_Nm{0.0};
   S motor_no_load_rad_s{1.0};
   S max_step_s{0.0};
@@ -67,7 +68,8 @@ class WindowPass {
                                                     bool apart) noexcept {
     BasicHeldTorques<S> held;
     held.brake_target_Nm = rig::brake_torque_at(plant_.brake, S(brake_duty));
-    held.brake_rate_per_s = plant_.brake.c31_per_s;
+    held.brake_rate_per_s = plant_.brake.c31_per_s * rig::select(held.brake_target_Nm < plant_.x[brake_torque],
+                                                                 plant_.brake_release_ratio, S(1.0));
     held.brake_limit_Nm_s = plant_.brake_limit_Nm_s;
     held.motor_stall_Nm = plant_.motor_stall_Nm * S(motor_duty);
     held.motor_back_emf_Nms = held.motor_stall_Nm / plant_.motor_no_load_rad_s;
