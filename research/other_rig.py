@@ -65,8 +65,9 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
             hot = math.exp(-fading_per_J * heat_J)
             heat_J += h * (torque * w1 - heat_J / cools_in_s)
             a = rates(w1, w2, torque, hot, *acts)
-            b = rates(w1 + 0.5 * h * a[0], w2 + 0.5 * h * a[1], torque + 0.5 * h * a[2], hot, *acts)
-            angle1 += h * (w1 + 0.5 * h * a[0])
-            angle2 += h * (w2 + 0.5 * h * a[1])
+            # A held wheel must not creep back by what the rule's half step overshoots.
+            half1, half2 = max(0.0, w1 + 0.5 * h * a[0]), max(0.0, w2 + 0.5 * h * a[1])
+            b = rates(half1, half2, torque + 0.5 * h * a[2], hot, *acts)
+            angle1, angle2 = angle1 + h * half1, angle2 + h * half2
             w1, w2, torque = max(0.0, w1 + h * b[0]), max(0.0, w2 + h * b[1]), max(0.0, torque + h * b[2])
     return dataclasses.replace(log, counts=counts - counts[0], first_counts=counts[0])
