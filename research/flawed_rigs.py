@@ -32,7 +32,7 @@ FLAWS = {'fading': ('brake_fading_per_J', 1e-4, 4e-4), 'dead time': ('brake_dead
 OTHERS = {'two lags': ({'release': 1.5}, 'brake_release_ratio'), 'bent map': ({'curvature': 0.2}, 'brake_curvature'),
           'friction by sliding speed': ({'by_sliding_s_m': 0.02}, 'friction_fall_s_m'),
           'friction by car speed': ({'by_speed_s_m': 0.01}, "changes with the lower wheel's speed"),
-          'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0}, 'the brake gets')}
+          'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0}, 'brake_fading_per_J')}
 #: features of each kind, joined by " + "
 KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc', 'fading + dead time', 'hysteresis + rate limit',
          'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time',

@@ -81,20 +81,26 @@ def test_a_rig_that_wanders_at_random_has_no_flaws():
             holds(found, key, TRUTH[key])
 
 
-def test_a_brake_with_two_lags_is_refused_by_name(tmp_path, monkeypatch, capsys):
-    logs = others(4, release=1.5)
+@pytest.mark.parametrize(('lacks', 'flaw'), [({'release': 1.5}, 'brake_release_ratio'), ({'curvature': 0.2}, 'brake_curvature'),
+                                             ({'by_sliding_s_m': 0.02}, 'friction_fall_s_m')])
+def test_lags_maps_and_tyres_of_another_simulator_are_found(lacks, flaw):
+    found = identify(others(4, **lacks))
+    assert not found.misfit, found.misfit
+    assert found.fit.problem.flaws == (flaw,)
+    holds(found, flaw, next(iter(lacks.values())))
+    for key in ('theta_N', 'B', 'J1_kg_m2', 'c31_per_s', 'b1_Nm'):
+        holds(found, key, TRUTH[key])
+
+
+def test_friction_that_falls_with_the_cars_speed_is_refused_by_name(tmp_path, monkeypatch, capsys):
+    logs = others(4, by_speed_s_m=0.01)
     found = identify(logs)
-    assert 'the brake lets go faster than it takes hold' in found.misfit
+    assert "the friction changes with the lower wheel's speed (-0.0" in found.misfit
     assert any(log.name in found.misfit for log in logs)
     assert all(estimate.low is None for estimate in found.parameters.values() if estimate.status != 'fixed')
     # The program says so, by its status too, and leaves no model behind, not even an older one.
     monkeypatch.setattr(program, 'identify', lambda *_, **__: found)
     (tmp_path / 'model.toml').write_text('an older one')
     assert program.main(['any', '--no-report', '--force', '--out', str(tmp_path)]) == program.MISFIT
-    assert 'the brake lets go faster than it takes hold' in capsys.readouterr().err
+    assert "the friction changes with the lower wheel's speed" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ['identified.json']
-
-
-def test_friction_that_falls_with_the_sliding_speed_is_refused_by_name():
-    found = identify(others(5, by_sliding_s_m=0.02))
-    assert 'the friction changes with the sliding speed (-0.0' in found.misfit

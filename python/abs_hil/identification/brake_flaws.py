@@ -45,7 +45,8 @@ def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
 
 def act(values: Mapping[str, float]) -> bool:
     """Whether there are flaws, on a map that has a duty for each torque from 0 up."""
-    return any(values.get(flaw.key, 0.0) for flaw in FLAWS if flaw.acts == 'flaw') and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
+    flawed = any(values.get(flaw.key, 0.0) for flaw in FLAWS if flaw.acts == 'flaw')
+    return flawed and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
 
 
 def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:

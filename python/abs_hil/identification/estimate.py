@@ -145,7 +145,8 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
 
 
 def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    """The first form that needs no cause which the plant lacks, or else the one that is likelier with its surest cause."""
+    """The first form if it needs no cause which the plant lacks, or one that nothing but the counts' steps disturbs. Else the
+    form that is likelier with its surest cause: the disturbances of a wrong form may hide every cause."""
     done: list[Finished] = []
     failed = ''
     for fit in fits:
@@ -154,7 +155,7 @@ def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check:
         except ValueError as error:
             failed = failed or str(error)
             continue
-        if not done[-1].causes:
+        if not done[-1].causes and (len(done) == 1 or done[-1].disturbances is None):
             return done[-1]
     if not done:
         raise ValueError(failed)

@@ -278,14 +278,19 @@ def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray
     return fit.normal.sum(axis=0), fit.right.sum(axis=0)
 
 
-def left_out_cost(fit: Fit) -> float:
+def left_out_cost(fit: Fit, doubted: str = '') -> float:
     """-2 log likelihood but for a constant of each log by what all the others tell, or of the only one. Needs the
-    normal equations of the last step or of `keep_normals`."""
+    normal equations of the last step or of `keep_normals`. A doubted flaw is none where the others do not tell."""
     N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
     if len(fit.normal) == 1:
         return float(fit.cost.sum() - n @ solved(fit, N, n))
     total = 0.0
     keys = fit.keys
+    if doubted:
+        at = keys.index(doubted)
+        to_none = (fit.problem.parameters[at].none - fit.values[doubted]) / fit.scale[at]
+        N[at, at] += to_none**-2
+        n[at] += 1.0 / to_none
     for log, (Nl, nl, cl) in enumerate(zip(fit.normal, fit.right, fit.cost)):
         x = solved(fit, N - Nl, n - nl)
         # Where its counters began, only the log itself can tell.

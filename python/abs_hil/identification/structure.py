@@ -214,7 +214,7 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     if not abs(flawed.values[key] - flaw.none) > SURE * sd:
         return None
     keep_normals(fit, run_filter(fit, disturbances)[1])
-    return flawed if left_out_cost(flawed) < left_out_cost(fit) else None
+    return flawed if left_out_cost(flawed, key) < left_out_cost(fit) else None
 
 
 def sentence(causes: Sequence[Found], fit: Fit) -> str:
