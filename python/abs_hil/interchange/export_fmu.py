@@ -28,7 +28,8 @@ BASE_UNITS: dict[str, dict[str, float]] = {
     'rad/s^2': {'rad': 1, 's': -2}, 'ms': {'s': 1, 'factor': 1e-3}, 'us': {'s': 1, 'factor': 1e-6}, 's^2': {'s': 2},
     'V': {'kg': 1, 'm': 2, 's': -3, 'A': -1}, 'deg C': {'K': 1, 'offset': 273.15}, 's/kg^2': {'s': 1, 'kg': -2},
     'kg^2 m/s^3': {'kg': 2, 'm': 1, 's': -3}, 'N^2/s': {'kg': 2, 'm': 2, 's': -5}, 'N^2 s': {'kg': 2, 'm': 2, 's': -3},
-    '(N m)^2/s': {'kg': 2, 'm': 4, 's': -5}, '1/N': {'kg': -1, 'm': -1, 's': 2}, '1/J': {'kg': -1, 'm': -2, 's': 2}}
+    '(N m)^2/s': {'kg': 2, 'm': 4, 's': -5}, '1/N': {'kg': -1, 'm': -1, 's': 2}, '1/J': {'kg': -1, 'm': -2, 's': 2},
+    's/m': {'s': 1, 'm': -1}}
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:
