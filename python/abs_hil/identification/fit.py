@@ -14,7 +14,7 @@ import scipy.optimize
 
 from ..core import _core
 from .brake_flaws import act
-from .linear import CONVERGED, disc_waves_rad, filtered, measure, run_filter, solved, step, to_rest
+from .linear import CONVERGED, disc_waves_rad, filtered, measure, run_filter, slopes, solved, step, to_rest
 from .logs import motion_of
 from .parameters import DELAY, RATE_LIMIT
 from .problem import LARGEST_QUIET_RMS, QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
@@ -27,6 +27,8 @@ ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0
 SMALL_DISC_RAD = 3e-4
 #: a residual without disturbances that hardly falls from above this, in counts, will not fall to the counts' steps
 HOPELESS_RMS = 10.0
+#: of the likelihood, in one search for the disturbances
+MOST_EVALUATIONS = 20
 
 
 def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool], key: str, others: Sequence[float],
@@ -200,23 +202,26 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
             step(fit, present, check)  # u0 may have begun far off
         search_u0(fit, present, 0.003 / 2**round_number, 7, check)
         if round_number < 3:
-            present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
+            present = likeliest_disturbances(fit, present)
             say(f'disturbances: {present}')
     if not moved < CONVERGED:
         to_rest(fit, present, 6, check)
     return fit
 
 
-def likeliest_disturbances(fit: Fit, guess: Disturbances, evaluations: int) -> Disturbances:
+def likeliest_disturbances(fit: Fit, guess: Disturbances) -> Disturbances:
     """Maximises the likelihood over the five standard deviations and one time constant, at this linearisation."""
     x0 = np.log(np.append(guess.sd, guess.time_constant_s[0]))
     # A weak pull keeps a factor that no log excites from running away.
     centre = np.log(np.array([0.01, 0.01, 0.01, 0.003, 0.003, 0.2]))
 
-    def cost(x: np.ndarray) -> float:
-        value, _ = run_filter(fit, Disturbances(np.exp(x[:5]), np.full(5, np.exp(x[5]))))
-        return value + float(np.sum(((x - centre) / 3.0)**2))
+    def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
+        present = Disturbances(np.exp(x[:5]), np.full(5, np.exp(x[5])))
+        value, found = run_filter(fit, present)
+        by_sd, by_time = slopes(fit, present, found)
+        pull = (x - centre) / 3.0
+        return value + float(pull @ pull), np.append(by_sd, by_time.sum()) + 2.0 / 3.0 * pull
     bounds = [*zip(np.log([1e-5] * 3 + [1e-6] * 2 + [0.02]), np.log([0.5] * 3 + [0.3] * 2 + [5.0]))]
-    best = scipy.optimize.minimize(cost, np.clip(x0, *np.transpose(bounds)), method='L-BFGS-B', bounds=bounds,
-                                   options={'maxfun': evaluations, 'eps': 0.02, 'ftol': 1e-6})
+    best = scipy.optimize.minimize(cost, np.clip(x0, *np.transpose(bounds)), method='L-BFGS-B', jac=True, bounds=bounds,
+                                   options={'maxfun': MOST_EVALUATIONS, 'ftol': 1e-6})
     return Disturbances(np.exp(best.x[:5]), np.full(5, np.exp(best.x[5])))
