@@ -198,8 +198,8 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
 
 
 def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
-    """The fit with one more flaw; None if it is not there after all: of another sign, not sure, or no help in predicting each
-    log from the others."""
+    """The fit with one more flaw; None if it is not there after all: of another sign, not sure, or against what logs that are
+    left out say."""
     key = found.cause.flaw
     problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
     at = [p.key for p in problem.parameters].index(key)
@@ -213,8 +213,15 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     sd = float(np.sqrt(flawed.covariance()[at, at]) * flawed.scale[at])
     if not abs(flawed.values[key] - flaw.none) > SURE * sd:
         return None
-    keep_normals(fit, run_filter(fit, disturbances)[1])
-    return flawed if left_out_cost(flawed, key) < left_out_cost(fit) else None
+    return flawed if _against(flawed, disturbances, key) < _against(fit, disturbances) else None
+
+
+def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> float:
+    """-2 log likelihood of all logs, and of each by what the others tell. The first decides about a flaw that one log alone
+    shows."""
+    cost, found = run_filter(fit, disturbances)
+    keep_normals(fit, found)
+    return cost + left_out_cost(fit, doubted)
 
 
 def sentence(causes: Sequence[Found], fit: Fit) -> str:
