@@ -49,7 +49,7 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
         if DEAD_TIME.key in problem.flaws:  # the derivative by a delay of the brake alone
             later = {**values, DELAY: values.get(DELAY, 0.0) + 1e-5}
             moved.append((problem.plant_values(later, number), 1e-5, 'brake'))
-        amount = amounts(log, problem.motions[number], brake, problem.flaws)
+        amount = amounts(log, problem.motions[number], brake, problem.flaws) if problem.flaws else {}
         for piece in pieces:
             if piece.log != number:
                 continue
