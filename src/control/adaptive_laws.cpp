@@ -89,7 +89,7 @@ template class AdaptiveActuatorLaw<double>;
 
 namespace {
 
-const AdaptivePeakOptions& checked(const AdaptivePeakOptions& o) {
+const AdaptivePeakOptions<>& checked(const AdaptivePeakOptions<>& o) {
   rig::require_valid(o, "control.adaptive_peak.");
   if (!(o.slip_min < o.slip_max))
     throw std::invalid_argument("control.adaptive_peak.slip_min must be below control.adaptive_peak.slip_max");
@@ -107,18 +107,12 @@ AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)
     : laws_{paper::laws(context.rig.wheels)},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
-      period_s_{1.0 / context.options.rate_Hz} {
-  const AdaptivePeakOptions& o = checked(context.options.adaptive_peak);
+      period_s_{1.0 / context.options.rate_Hz},
+      options_{checked(context.options.adaptive_peak)} {
+  const auto& o = options_;
   gains_.ks0 = o.ks0;
   gains_.ks1 = o.ks1;
   lag_decay_ = rig::exponential_less_one(-o.lag_gain_per_s * period_s_);
-  slip_min_ = o.slip_min;
-  slip_max_ = o.slip_max;
-  slip_start_ = o.slip_start;
-  slip_rate_per_s_ = o.slip_rate_per_s;
-  search_part_ = o.search_part;
-  search_min_ = o.search_min;
-  search_rad_s_ = o.search_rad_s;
   observer_ = {o.observer, context.rig, context.options.rate_Hz};
   peak_ = {o.peak, o.slip_min, o.slip_max, context.options.rate_Hz};
 }
@@ -127,7 +121,7 @@ template class AdaptivePeakLaw<double>;
 
 namespace {
 
-const BrakingStiffnessOptions& checked(const BrakingStiffnessOptions& o) {
+const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
   rig::require_valid(o, "control.braking_stiffness.");
   if (!(o.slip_min <= o.slip_start && o.slip_start <= o.slip_max)) {
     throw std::invalid_argument("control.braking_stiffness.slip_start must be in [slip_min, slip_max]");
@@ -143,17 +137,10 @@ BrakingStiffnessLaw<S>::BrakingStiffnessLaw(const ControllerContext& context)
     : laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
-      v_min_m_s_{context.options.v_min_m_s} {
-  const BrakingStiffnessOptions& o = checked(context.options.braking_stiffness);
+      v_min_m_s_{context.options.v_min_m_s},
+      options_{checked(context.options.braking_stiffness)} {
+  const auto& o = options_;
   torque_decay_ = rig::exponential_less_one(-o.lag_gain_per_s * (1.0 / context.options.rate_Hz));
-  target_ = o.target;
-  rate_per_s_ = o.rate_per_s;
-  slip_min_ = o.slip_min;
-  slip_max_ = o.slip_max;
-  slip_start_ = o.slip_start;
-  search_part_ = o.search_part;
-  search_rad_s_ = o.search_rad_s;
-  slip_gain_per_s_ = o.slip_gain_per_s;
   observer_ = {o.observer, context.rig, context.options.rate_Hz};
   stiffness_ = {o.memory_s, o.slip_noise};
 }

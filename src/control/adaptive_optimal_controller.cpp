@@ -15,7 +15,7 @@ namespace {
 // The curve is learnt about this often, however short the cycles are: more readings of the same counts say no more.
 constexpr double learning_rate_Hz = 1000.0;
 
-const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
+const AdaptiveOptimalOptions<>& checked(const AdaptiveOptimalOptions<>& o) {
   rig::require_valid(o, "control.adaptive_optimal.");
   if (!(o.slip_min < o.slip_max)) {
     throw std::invalid_argument("control.adaptive_optimal.slip_min must be below control.adaptive_optimal.slip_max");
@@ -28,7 +28,7 @@ const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
 
 /// Coarser counts make the force, the first speeds and the loop noisier. The powers were chosen with the gains
 /// (docs/theory-beyond.md).
-AdaptiveOptimalOptions counted(AdaptiveOptimalOptions options, const rig::RigParameters& rig) {
+AdaptiveOptimalOptions<> counted(AdaptiveOptimalOptions<> options, const rig::RigParameters& rig) {
   constexpr double usual_counts_per_rev = 4096.0;
   constexpr double most_search_part = 0.5;
   const double coarser = usual_counts_per_rev / rig.encoder_counts_per_rev;
@@ -42,7 +42,7 @@ AdaptiveOptimalOptions counted(AdaptiveOptimalOptions options, const rig::RigPar
   return options;
 }
 
-ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& rig) noexcept {
+ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters& rig) noexcept {
   const double limit = rig.brake.brake_rate_limit_Nm_s;
   return {.mass_kg_m = rig.wheels.J1_kg_m2 / rig.wheels.r1_m,
           .gain_per_s = o.slip_gain_per_s,
@@ -56,33 +56,14 @@ ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& 
 template <class S>
 AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
   requires std::is_same_v<S, double>
-    : laws_{paper::laws(context.rig.wheels)},
+    : options_{counted(checked(context.options.adaptive_optimal), context.rig)},
+      laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       period_s_{1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
       learns_every_{std::max(1.0, std::round(context.options.rate_Hz / learning_rate_Hz))} {
-  const AdaptiveOptimalOptions o = counted(checked(context.options.adaptive_optimal), context.rig);
-  gains_ = {.torque_gain_per_s = o.torque_gain_per_s,
-            .torque_gain_near_per_s = o.torque_gain_near_per_s,
-            .torque_near_Nm = o.torque_near_Nm,
-            .play_Nm = o.play_Nm,
-            .slip_gain_per_s = o.slip_gain_per_s,
-            .slip_gain_near_per_s = o.slip_gain_near_per_s,
-            .slip_gain_runaway = o.slip_gain_runaway,
-            .authority = o.authority,
-            .authority_past_peak = o.authority_past_peak,
-            .bold_slip = o.bold_slip,
-            .model_error_per_s = o.model_error_per_s,
-            .peak_factor = o.peak_factor,
-            .runaway = o.runaway,
-            .slip_min = o.slip_min,
-            .slip_max = o.slip_max,
-            .slip_start = o.slip_start,
-            .slip_rate_per_s = o.slip_rate_per_s,
-            .search_part = o.search_part,
-            .search_rad_s = o.search_rad_s,
-            .force_bandwidth_rad_s = o.bank.force_bandwidth_rad_s};
+  const auto& o = options_;
   loop_ = loop(o, context.rig);
   observer_ = {o.observer, context.rig, context.options.rate_Hz};
   force_ = {context.rig.wheels, o.bank.force_bandwidth_rad_s};
@@ -101,7 +82,7 @@ void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
                .force_N = (turning_Nm + input.brake_torque_Nm) / laws_.r1,
                .swing_m_s = swing(input.disc_error_rad, input.speeds.omega2_rad_s).speed_m_s});
   speeds_.reset(input.speeds);
-  reference_ = gains_.slip_start;
+  reference_ = options_.slip_start;
   model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
   last_speeds_ = input.speeds;
   unlearnt_ = {};

@@ -70,13 +70,6 @@ class AdaptiveOptimalLaw {
   using Bank = BasicFrictionBank<S>;
   using Speeds = rig::BasicWheelSpeeds<S>;
 
-  struct Gains {
-    S torque_gain_per_s{0.0}, torque_gain_near_per_s{0.0}, torque_near_Nm{0.0}, play_Nm{0.0};
-    S slip_gain_per_s{0.0}, slip_gain_near_per_s{0.0}, slip_gain_runaway{0.0};
-    S authority{0.0}, authority_past_peak{0.0}, bold_slip{0.0}, model_error_per_s{0.0}, peak_factor{0.0}, runaway{0.0};
-    S slip_min{0.0}, slip_max{0.0}, slip_start{0.0}, slip_rate_per_s{0.0}, search_part{0.0}, search_rad_s{0.0};
-    S force_bandwidth_rad_s{0.0};
-  };
   /// The torques that hold the slip: as it is wanted, and as it is.
   struct Holding {
     S wanted_Nm;
@@ -102,7 +95,7 @@ class AdaptiveOptimalLaw {
   [[nodiscard]] S through_lag_Nm(const S& torque_Nm, const S& wanted_Nm) const noexcept;
   [[nodiscard]] S with_play_Nm(const S& torque_Nm, const S& most_Nm) noexcept;
 
-  Gains gains_{};
+  AdaptiveOptimalOptions<S> options_{};
   paper::Laws<S> laws_{};
   rig::BasicBrake<S> brake_{};
   BasicBrakeLag<S> lag_{};

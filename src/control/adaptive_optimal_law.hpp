@@ -32,7 +32,7 @@ auto AdaptiveOptimalLaw<S>::swing(const S& disc_error_rad, const S& omega_rad_s)
     typename Bank::Swing {
   if (!rig::any(disc_error_rad > 0.0)) return {};
   const S force_N = laws_.J2 * disc_error_rad * omega_rad_s * omega_rad_s / laws_.r2;
-  const S ratio = omega_rad_s / gains_.force_bandwidth_rad_s;
+  const S ratio = omega_rad_s / options_.bank.force_bandwidth_rad_s;
   const S one_lag = 1.0 / rig::square_root(S(1.0 + ratio * ratio));
   return {.force_N = force_N * one_lag * one_lag * one_lag,
           .quick_force_N = adaptive_optimal::quick_passes * force_N,
@@ -71,7 +71,7 @@ void AdaptiveOptimalLaw<S>::learn(const BasicSlipInput<S>& input, const S& slip)
       laws_.T_b(laws_.k(same) * (observer_.force_N() - bank_.late_force_N())) - observer_.brake_error_Nm();
   if (rig::any(step.time_s != step_s_)) {
     step_s_ = step.time_s;
-    error_covered_ = -rig::exponential_less_one(S(-gains_.model_error_per_s * step_s_));
+    error_covered_ = -rig::exponential_less_one(S(-options_.model_error_per_s * step_s_));
   }
   model_error_Nm_ += error_covered_ * (missing_Nm - model_error_Nm_);
 }
@@ -81,20 +81,20 @@ void AdaptiveOptimalLaw<S>::learn(const BasicSlipInput<S>& input, const S& slip)
 template <class S>
 S AdaptiveOptimalLaw<S>::peak_factor() const noexcept {
   constexpr double least = 0.75;
-  return rig::larger(S(least), 1.0 + (gains_.peak_factor - 1.0) * (1.0 - bank_.runaway() / gains_.runaway));
+  return rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
 }
 
 template <class S>
 S AdaptiveOptimalLaw<S>::next_reference(const S& dt_s) noexcept {
-  const S target = rig::clamped(S(peak_factor() * bank_.peak_slip()), gains_.slip_min, gains_.slip_max);
+  const S target = rig::clamped(S(peak_factor() * bank_.peak_slip()), options_.slip_min, options_.slip_max);
   if (rig::any(dt_s != cycle_s_)) {
     cycle_s_ = dt_s;
-    largest_rise_ = rig::exponential(S(gains_.slip_rate_per_s * dt_s));
+    largest_rise_ = rig::exponential(S(options_.slip_rate_per_s * dt_s));
   }
   // A peak that turns out to be near must not be passed: only a rise takes time.
   reference_ = rig::smaller(target, reference_ * largest_rise_);
-  search_rad_ = within_half_turn_rad(S(search_rad_ + gains_.search_rad_s * dt_s));
-  const S search = gains_.search_part * rig::sine(search_rad_);
+  search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
+  const S search = options_.search_part * rig::sine(search_rad_);
   return reference_ * (1.0 + search) - bank_.slip_zero();
 }
 
@@ -116,9 +116,9 @@ S AdaptiveOptimalLaw<S>::dared_torque_Nm(const typename Bank::Force& wanted, con
   const S here_Nm = holding_torque_Nm(speeds, slip, rig::larger(S(0.0), bank_.force_N()));
   const S v_x = rig::larger(S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
   const S bold_Nm = rig::square_root(
-      S(2.0 * gains_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s * rig::larger(here_Nm, S(usual_hold_Nm))));
+      S(2.0 * options_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s * rig::larger(here_Nm, S(usual_hold_Nm))));
   // A spread that moves the torque by less than the play counts as known, however small the force is.
-  const S least_N = gains_.play_Nm / (known_spread * laws_.r1);
+  const S least_N = options_.play_Nm / (known_spread * laws_.r1);
   const S spread = rig::select(wanted.N > 0.0, S(wanted.spread_N / rig::larger(wanted.N, least_N)), S(unknown_spread));
   const S unknown = rig::clamped(S((spread - known_spread) / (unknown_spread - known_spread)), S(0.0), S(1.0));
   return rig::clamped(wanted_Nm, S(here_Nm + unknown * bold_Nm), S(here_Nm + bold_Nm));
@@ -149,8 +149,8 @@ auto AdaptiveOptimalLaw<S>::holding(const S& slip, const S& reference, const S& 
 template <class S>
 S AdaptiveOptimalLaw<S>::near_gain_per_s() const noexcept {
   const S runaway_per_s = bank_.runaway() * brake_.c31_per_s;
-  return rig::smaller(rig::larger(gains_.slip_gain_per_s, gains_.slip_gain_near_per_s),
-                      gains_.slip_gain_near_per_s + gains_.slip_gain_runaway * runaway_per_s);
+  return rig::smaller(rig::larger(options_.slip_gain_per_s, options_.slip_gain_near_per_s),
+                      options_.slip_gain_near_per_s + options_.slip_gain_runaway * runaway_per_s);
 }
 
 template <class S>
@@ -158,7 +158,7 @@ S AdaptiveOptimalLaw<S>::wanted_torque_Nm(const Holding& hold, const S& error_m_
   const S size = rig::magnitude(error_m_s);
   const auto too_little = error_m_s < 0.0;
   S wanted_Nm(0.0);
-  if (rig::any(too_little)) wanted_Nm = hold.wanted_Nm + loop_.excess_Nm(size, hold.wanted_Nm, gains_.authority);
+  if (rig::any(too_little)) wanted_Nm = hold.wanted_Nm + loop_.excess_Nm(size, hold.wanted_Nm, options_.authority);
   if (!rig::any(!too_little)) return wanted_Nm;
   const auto below = [&](const S& torque_Nm, const S& authority) -> S {
     const S room_Nm = rig::larger(S(adaptive_optimal::least_room_Nm), most_Nm - torque_Nm);
@@ -166,23 +166,23 @@ S AdaptiveOptimalLaw<S>::wanted_torque_Nm(const Holding& hold, const S& error_m_
   };
   return rig::select(
       too_little, wanted_Nm,
-      rig::smaller(below(hold.wanted_Nm, gains_.authority), below(hold.here_Nm, gains_.authority_past_peak)));
+      rig::smaller(below(hold.wanted_Nm, options_.authority), below(hold.here_Nm, options_.authority_past_peak)));
 }
 
 template <class S>
 S AdaptiveOptimalLaw<S>::through_lag_Nm(const S& torque_Nm, const S& wanted_Nm) const noexcept {
   const S error_Nm = wanted_Nm - torque_Nm;
   const S size = rig::magnitude(error_Nm);
-  const S near = gains_.torque_gain_near_per_s;
-  const S gain = near + (gains_.torque_gain_per_s - near) * size / (size + gains_.torque_near_Nm);
+  const S near = options_.torque_gain_near_per_s;
+  const S gain = near + (options_.torque_gain_per_s - near) * size / (size + options_.torque_near_Nm);
   return lag_.command_Nm(torque_Nm, S(-rig::exponential_less_one(S(-gain * period_s_)) * error_Nm));
 }
 
 template <class S>
 S AdaptiveOptimalLaw<S>::with_play_Nm(const S& torque_Nm, const S& most_Nm) noexcept {
   const auto at_an_end = torque_Nm <= 0.0 || torque_Nm >= most_Nm;
-  const S rests_Nm = rig::clamped(sent_Nm_, rig::larger(S(0.0), torque_Nm - gains_.play_Nm),
-                                  rig::smaller(most_Nm, torque_Nm + gains_.play_Nm));
+  const S rests_Nm = rig::clamped(sent_Nm_, rig::larger(S(0.0), torque_Nm - options_.play_Nm),
+                                  rig::smaller(most_Nm, torque_Nm + options_.play_Nm));
   return sent_Nm_ = rig::select(at_an_end, rig::clamped(torque_Nm, S(0.0), most_Nm), rests_Nm);
 }
 

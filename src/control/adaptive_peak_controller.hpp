@@ -47,13 +47,7 @@ class AdaptivePeakLaw {
   S v_min_m_s_{0.0};
   S period_s_{0.0};
   S lag_decay_{0.0};  ///< part of the torque error that decays in a period, negative
-  S slip_min_{0.0};
-  S slip_max_{0.0};
-  S slip_start_{0.0};
-  S slip_rate_per_s_{0.0};
-  S search_part_{0.0};
-  S search_min_{0.0};
-  S search_rad_s_{0.0};
+  AdaptivePeakOptions<S> options_{};
   BasicWheelForceObserver<S> observer_{};
   BasicSlipPeakEstimator<S> peak_{};
   BasicSlipErrorIntegral<S> integral_{};
@@ -68,7 +62,7 @@ template <class S>
 void AdaptivePeakLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
   observer_.reset(input.speeds);
   peak_.reset();
-  centre_ = slip_start_;
+  centre_ = options_.slip_start;
   integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, centre_), centre_);
   search_angle_rad_ = S(0.0);
   half_late_slip_ = late_slip_ = S(0.0);
@@ -85,15 +79,15 @@ void AdaptivePeakLaw<S>::learn(const S& dt_s, const S& slip) noexcept {
 
 template <class S>
 typename AdaptivePeakLaw<S>::Reference AdaptivePeakLaw<S>::next_reference(const S& dt_s) noexcept {
-  const S target = rig::clamped(peak_.peak_slip(), slip_min_, slip_max_);
-  const S most = slip_rate_per_s_ * dt_s;
+  const S target = rig::clamped(peak_.peak_slip(), options_.slip_min, options_.slip_max);
+  const S most = options_.slip_rate_per_s * dt_s;
   const S step = rig::clamped(S(target - centre_), S(-most), most);
   centre_ += step;
-  search_angle_rad_ = within_half_turn_rad(S(search_angle_rad_ + search_rad_s_ * dt_s));
-  const S swing = rig::larger(S(search_part_ * centre_), search_min_);
+  search_angle_rad_ = within_half_turn_rad(S(search_angle_rad_ + options_.search_rad_s * dt_s));
+  const S swing = rig::larger(S(options_.search_part * centre_), options_.search_min);
   return {.slip = centre_ + swing * rig::sine(search_angle_rad_),
-          .rate_per_s =
-              rig::select(dt_s > 0.0, S(step / dt_s), S(0.0)) + swing * search_rad_s_ * rig::cosine(search_angle_rad_)};
+          .rate_per_s = rig::select(dt_s > 0.0, S(step / dt_s), S(0.0)) +
+                        swing * options_.search_rad_s * rig::cosine(search_angle_rad_)};
 }
 
 template <class S>

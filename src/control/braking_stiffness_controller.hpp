@@ -81,14 +81,7 @@ class BrakingStiffnessLaw {
   BasicBrakeLag<S> lag_{};
   S torque_decay_{0.0};  ///< part of the torque error that decays in a period, negative
   S v_min_m_s_{0.0};
-  S target_{0.0};
-  S rate_per_s_{0.0};
-  S slip_min_{0.0};
-  S slip_max_{0.0};
-  S slip_start_{0.0};
-  S search_part_{0.0};
-  S search_rad_s_{0.0};
-  S slip_gain_per_s_{0.0};
+  BrakingStiffnessOptions<S> options_{};
   BasicWheelForceObserver<S> observer_{};
   BasicBrakingStiffness<S> stiffness_{};
   S late_slip_{0.0};  ///< as late as the observed force
@@ -101,7 +94,7 @@ void BrakingStiffnessLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
   observer_.reset(input.speeds);
   stiffness_.reset();
   late_slip_ = search_rad_ = S(0.0);
-  reference_ = slip_start_;
+  reference_ = options_.slip_start;
 }
 
 template <class S>
@@ -109,9 +102,9 @@ void BrakingStiffnessLaw<S>::move_reference(const S& dt_s, const S& slip) noexce
   if (!rig::any(dt_s > 0.0)) return;
   late_slip_ += -rig::exponential_less_one(S(-dt_s / observer_.force_delay_s())) * (slip - late_slip_);
   stiffness_.learn(dt_s, late_slip_, observer_.force_N());
-  const S rise = rate_per_s_ * (stiffness_.elasticity() - target_) * dt_s;
-  reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), slip_min_, slip_max_);
-  search_rad_ = within_half_turn_rad(S(search_rad_ + search_rad_s_ * dt_s));
+  const S rise = options_.rate_per_s * (stiffness_.elasticity() - options_.target) * dt_s;
+  reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), options_.slip_min, options_.slip_max);
+  search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
 }
 
 template <class S>
@@ -120,14 +113,14 @@ BasicSlipOutput<S> BrakingStiffnessLaw<S>::step(const BasicSlipInput<S>& input) 
   const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
   move_reference(input.dt_s,
                  rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_));
-  const S reference = reference_ * (1.0 + search_part_ * rig::sine(search_rad_));
+  const S reference = reference_ * (1.0 + options_.search_part * rig::sine(search_rad_));
   const paper::Reading<S> now{
       .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference, .phi = S(1.0)};
   const S error_m_s = laws_.e_v(now);
   const S force_N = rig::larger(S(0.0), observer_.force_N());
   const S wanted_Nm = rig::clamped(
-      S(laws_.T_b(laws_.xi_1(now, S(-slip_gain_per_s_ * error_m_s), force_N)) - observer_.brake_error_Nm()), S(0.0),
-      full_torque_Nm(brake_, input.max_brake_torque_Nm));
+      S(laws_.T_b(laws_.xi_1(now, S(-options_.slip_gain_per_s * error_m_s), force_N)) - observer_.brake_error_Nm()),
+      S(0.0), full_torque_Nm(brake_, input.max_brake_torque_Nm));
   const S step_Nm = torque_decay_ * (input.brake_torque_Nm - wanted_Nm);
   const auto lags = rig::is_finite(input.max_brake_torque_Nm);
   return {.brake_torque_Nm = rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, step_Nm), wanted_Nm),

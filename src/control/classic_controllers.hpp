@@ -153,11 +153,8 @@ class MixedSlipDecelerationLaw {
     requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},
-        weight_{context.options.mixed_slip_deceleration.weight},
-        target_{context.options.mixed_slip_deceleration.target},
-        kp_Nm_{context.options.mixed_slip_deceleration.kp_Nm},
-        ki_Nm_s_{context.options.mixed_slip_deceleration.ki_Nm_s} {
-    rig::require_valid(context.options.mixed_slip_deceleration, "control.mixed_slip_deceleration.");
+        options_{context.options.mixed_slip_deceleration} {
+    rig::require_valid(options_, "control.mixed_slip_deceleration.");
   }
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept { integral_Nm_ = S(0.0); }
@@ -167,10 +164,7 @@ class MixedSlipDecelerationLaw {
  private:
   paper::Laws<S> laws_{};
   rig::BasicBrake<S> brake_{};
-  S weight_{0.0};
-  S target_{0.0};
-  S kp_Nm_{0.0};
-  S ki_Nm_s_{0.0};
+  MixedSlipDecelerationOptions<S> options_{};
   S integral_Nm_{0.0};
 };
 
@@ -179,12 +173,12 @@ BasicSlipOutput<S> MixedSlipDecelerationLaw<S>::step(const BasicSlipInput<S>& in
   constexpr double g_m_s2 = 9.81;
   const S deceleration =
       rig::select(turns(input.speeds.omega1_rad_s), S(-laws_.r1 * input.alpha1_rad_s2 / g_m_s2), S(0.0));
-  const S error = target_ - (input.slip + weight_ * deceleration);
+  const S error = options_.target - (input.slip + options_.weight * deceleration);
   const S full_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
   // Where less was sent than asked for, the integral must not grow, and the other way round.
-  const S integral_Nm = rig::clamped(S(integral_Nm_ + ki_Nm_s_ * error * input.dt_s), S(0.0), full_Nm);
+  const S integral_Nm = rig::clamped(S(integral_Nm_ + options_.ki_Nm_s * error * input.dt_s), S(0.0), full_Nm);
   integral_Nm_ = rig::select(input.unsent_torque_Nm * error > 0.0, integral_Nm_, integral_Nm);
-  return {.brake_torque_Nm = rig::clamped(S(kp_Nm_ * error + integral_Nm_), S(0.0), full_Nm),
+  return {.brake_torque_Nm = rig::clamped(S(options_.kp_Nm * error + integral_Nm_), S(0.0), full_Nm),
           .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
           .theta_est_N = rig::unknown};
 }

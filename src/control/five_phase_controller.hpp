@@ -40,24 +40,16 @@ class FivePhaseLaw {
     requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},
-        hold_below_m_s2_{context.options.five_phase.hold_below_m_s2},
-        release_below_m_s2_{context.options.five_phase.release_below_m_s2},
-        recover_above_m_s2_{context.options.five_phase.recover_above_m_s2},
-        reapply_below_m_s2_{context.options.five_phase.reapply_below_m_s2},
-        hold_limit_s_{context.options.five_phase.hold_limit_s},
-        recover_limit_s_{context.options.five_phase.recover_limit_s},
-        apply_Nm_s_{context.options.five_phase.apply_Nm_s},
-        release_Nm_s_{context.options.five_phase.release_Nm_s},
-        reapply_Nm_s_{context.options.five_phase.reapply_Nm_s},
+        options_{context.options.five_phase},
         period_s_{1.0 / context.options.rate_Hz} {
-    rig::require_valid(context.options.five_phase, "control.five_phase.");
-    if (!(release_below_m_s2_ <= hold_below_m_s2_)) {
+    rig::require_valid(options_, "control.five_phase.");
+    if (!(options_.release_below_m_s2 <= options_.hold_below_m_s2)) {
       throw std::invalid_argument("control.five_phase.release_below_m_s2 must not be above hold_below_m_s2");
     }
-    if (!(recover_above_m_s2_ > release_below_m_s2_)) {
+    if (!(options_.recover_above_m_s2 > options_.release_below_m_s2)) {
       throw std::invalid_argument("control.five_phase.recover_above_m_s2 must be above release_below_m_s2");
     }
-    if (!(reapply_below_m_s2_ > hold_below_m_s2_)) {
+    if (!(options_.reapply_below_m_s2 > options_.hold_below_m_s2)) {
       throw std::invalid_argument("control.five_phase.reapply_below_m_s2 must be above hold_below_m_s2");
     }
     if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("control.rate_Hz must be > 0 Hz");
@@ -87,16 +79,7 @@ class FivePhaseLaw {
 
   paper::Laws<S> laws_{};
   rig::BasicBrake<S> brake_{};
-  // FivePhaseOptions.
-  S hold_below_m_s2_{0.0};
-  S release_below_m_s2_{0.0};
-  S recover_above_m_s2_{0.0};
-  S reapply_below_m_s2_{0.0};
-  S hold_limit_s_{0.0};
-  S recover_limit_s_{0.0};
-  S apply_Nm_s_{0.0};
-  S release_Nm_s_{0.0};
-  S reapply_Nm_s_{0.0};
+  FivePhaseOptions<S> options_{};
   S period_s_{0.0};
   S phase_{0.0};  ///< the number of a BrakePhase
   S in_phase_s_{0.0};
@@ -108,13 +91,14 @@ class FivePhaseLaw {
 template <class S>
 S FivePhaseLaw<S>::next_phase(const S& a_m_s2) const noexcept {
   using enum BrakePhase;
-  const auto unstable = a_m_s2 < hold_below_m_s2_;
-  const auto held_long = in_phase_s_ >= hold_limit_s_;
-  const auto recovered = (accelerated_ > 0.0 && a_m_s2 < reapply_below_m_s2_) || in_phase_s_ >= recover_limit_s_;
-  const auto turned = a_m_s2 > recover_above_m_s2_ || at_zero_s_ >= recover_limit_s_;
+  const auto unstable = a_m_s2 < options_.hold_below_m_s2;
+  const auto held_long = in_phase_s_ >= options_.hold_limit_s;
+  const auto recovered =
+      (accelerated_ > 0.0 && a_m_s2 < options_.reapply_below_m_s2) || in_phase_s_ >= options_.recover_limit_s;
+  const auto turned = a_m_s2 > options_.recover_above_m_s2 || at_zero_s_ >= options_.recover_limit_s;
 
   const S from_apply = rig::select(unstable, number(hold), phase_);
-  const S from_hold = rig::select(a_m_s2 < release_below_m_s2_, number(release),
+  const S from_hold = rig::select(a_m_s2 < options_.release_below_m_s2, number(release),
                                   rig::select(!unstable || held_long, number(reapply), phase_));
   const S from_release = rig::select(turned, number(recover), phase_);
   const S from_recover = rig::select(unstable, number(hold), rig::select(recovered, number(reapply), phase_));
@@ -125,8 +109,9 @@ S FivePhaseLaw<S>::next_phase(const S& a_m_s2) const noexcept {
 template <class S>
 S FivePhaseLaw<S>::ramp_Nm_s() const noexcept {
   using enum BrakePhase;
-  return rig::select(in(apply), apply_Nm_s_,
-                     rig::select(in(release), S(-release_Nm_s_), rig::select(in(reapply), reapply_Nm_s_, S(0.0))));
+  return rig::select(
+      in(apply), options_.apply_Nm_s,
+      rig::select(in(release), S(-options_.release_Nm_s), rig::select(in(reapply), options_.reapply_Nm_s, S(0.0))));
 }
 
 template <class S>
@@ -134,7 +119,7 @@ BasicSlipOutput<S> FivePhaseLaw<S>::step(const BasicSlipInput<S>& input) noexcep
   const S unbounded_m_s2 = S(-std::numeric_limits<double>::infinity());
   const S acceleration_m_s2 =
       rig::select(turns(input.speeds.omega1_rad_s), S(laws_.r1 * input.alpha1_rad_s2), unbounded_m_s2);
-  const auto accelerates = acceleration_m_s2 > reapply_below_m_s2_;
+  const auto accelerates = acceleration_m_s2 > options_.reapply_below_m_s2;
   in_phase_s_ += input.dt_s;
   at_zero_s_ = rig::select(torque_Nm_ > 0.0, S(0.0), S(at_zero_s_ + input.dt_s));
   accelerated_ = rig::select(accelerates, S(1.0), accelerated_);

@@ -30,32 +30,9 @@ double number(const auto& row, std::size_t j) noexcept { return row.v[j / 2][j %
 }  // namespace
 
 template <class S>
-BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions& o, double rate_Hz, double quick_delay_s)
+BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions<>& o, double rate_Hz, double quick_delay_s)
   requires std::is_same_v<S, double>
-    : options_{.force_bandwidth_rad_s = o.force_bandwidth_rad_s,
-               .force_noise_N2_s = o.force_noise_N2_s,
-               .force_error = o.force_error,
-               .timing_error_s = o.timing_error_s,
-               .slip_noise_m_s = o.slip_noise_m_s,
-               .start_s = o.start_s,
-               .level0_N = o.level0_N,
-               .level_spread_N = o.level_spread_N,
-               .zero_error_m_s = o.zero_error_m_s,
-               .zero_error_per_N = o.zero_error_per_N,
-               .past_peak_cost = o.past_peak_cost,
-               .level_drift_per_s = o.level_drift_per_s,
-               .level_drift_unexplained_per_s = o.level_drift_unexplained_per_s,
-               .zero_drift_per_s = o.zero_drift_per_s,
-               .share_per_s = o.share_per_s,
-               .jump_share = o.jump_share,
-               .jump_least_N = o.jump_least_N,
-               .jump_confirm_s = o.jump_confirm_s,
-               .jump_hold_s = o.jump_hold_s,
-               .jump_time_constant_s = o.jump_time_constant_s,
-               .jump_spread = o.jump_spread,
-               .jump_after_s = o.jump_after_s},
-      rate_Hz_{rate_Hz},
-      quick_delay_s_{quick_delay_s} {
+    : options_{o}, rate_Hz_{rate_Hz}, quick_delay_s_{quick_delay_s} {
   rig::require_valid(o, "control.adaptive_optimal.");
   if (!(rate_Hz > 0.0 && quick_delay_s > 0.0)) {
     throw std::invalid_argument("the friction bank needs a control rate and a delay of the quick force > 0");

@@ -50,7 +50,7 @@ class BasicFrictionBank {
   BasicFrictionBank() = default;
   /// @param quick_delay_s  by which `Data::quick_force_N` follows the force, > 0
   /// Throws std::invalid_argument for options out of range.
-  BasicFrictionBank(const FrictionBankOptions& options, double rate_Hz, double quick_delay_s)
+  BasicFrictionBank(const FrictionBankOptions<>& options, double rate_Hz, double quick_delay_s)
     requires std::is_same_v<S, double>;
 
   /// Amplitudes of the once-a-turn errors that encoder discs off their centres may cause; 0: the discs are known.
@@ -119,13 +119,6 @@ class BasicFrictionBank {
   struct alignas(2 * sizeof(S)) LaneWords : std::array<S, peaks> {};
   using Words = std::conditional_t<alone, Row, LaneWords>;
 
-  struct Options {
-    S force_bandwidth_rad_s{0.0}, force_noise_N2_s{0.0}, force_error{0.0}, timing_error_s{0.0}, slip_noise_m_s{0.0};
-    S start_s{0.0}, level0_N{0.0}, level_spread_N{0.0}, zero_error_m_s{0.0}, zero_error_per_N{0.0};
-    S past_peak_cost{0.0}, level_drift_per_s{0.0}, level_drift_unexplained_per_s{0.0}, zero_drift_per_s{0.0};
-    S share_per_s{0.0}, jump_share{0.0}, jump_least_N{0.0}, jump_confirm_s{0.0}, jump_hold_s{0.0};
-    S jump_time_constant_s{0.0}, jump_spread{0.0}, jump_after_s{0.0};
-  };
   struct LaneDelay {
     std::array<Words, 3> lags{};
     Words last{}, before{};
@@ -217,7 +210,7 @@ class BasicFrictionBank {
   void watch_for_jumps(const Data& data) noexcept;
   void summarise(const S& runaway_per_N) noexcept;
 
-  Options options_{};
+  FrictionBankOptions<S> options_{};
   S rate_Hz_{0.0};
   S quick_delay_s_{0.0};
   S last_dt_s_{0.0};

@@ -22,30 +22,27 @@ class BasicSwitchingThetaEstimator {
  public:
   BasicSwitchingThetaEstimator() = default;
   /// Throws std::invalid_argument for a gain or bounds out of range.
-  explicit BasicSwitchingThetaEstimator(const SwitchingAdaptationOptions& options)
+  explicit BasicSwitchingThetaEstimator(const SwitchingAdaptationOptions<>& options)
     requires std::is_same_v<S, double>
-      : gamma_{options.gamma},
-        theta0_N_{options.theta0_N},
-        theta_min_N_{options.theta_min_N},
-        theta_max_N_{options.theta_max_N},
-        theta_N_{options.theta0_N} {
+      : options_{options}, theta_N_{options.theta0_N} {
     rig::require_valid(options, "");
-    if (!(theta_min_N_ <= theta0_N_ && theta0_N_ <= theta_max_N_)) {
+    if (!(options.theta_min_N <= options.theta0_N && options.theta0_N <= options.theta_max_N)) {
       throw std::invalid_argument("theta0_N must be in [theta_min_N, theta_max_N]");
     }
   }
 
-  void reset() noexcept { theta_N_ = theta0_N_; }
+  void reset() noexcept { theta_N_ = options_.theta0_N; }
   /// Takes over the other's estimate, limited to the own bounds.
   void take_over(const BasicSwitchingThetaEstimator& before) noexcept {
-    theta_N_ = rig::clamped(before.theta_N_, theta_min_N_, theta_max_N_);
+    theta_N_ = rig::clamped(before.theta_N_, options_.theta_min_N, options_.theta_max_N);
   }
   /// @param gain_phi  k(slip_ref) phi(slip), mean over the past interval
   /// @param switching  s of the past interval
   /// @param where  elsewhere the estimate is held
   template <class Condition>
   void update(const Condition& where, const S& dt_s, const S& gain_phi, const S& switching) noexcept {
-    const S theta_N = rig::clamped(S(theta_N_ - gamma_ * gain_phi * switching * dt_s), theta_min_N_, theta_max_N_);
+    const S theta_N = rig::clamped(S(theta_N_ - options_.gamma * gain_phi * switching * dt_s), options_.theta_min_N,
+                                   options_.theta_max_N);
     theta_N_ = rig::select(where, theta_N, theta_N_);
   }
   void update(const S& dt_s, const S& gain_phi, const S& switching) noexcept {
@@ -55,10 +52,7 @@ class BasicSwitchingThetaEstimator {
   [[nodiscard]] S theta_N() const noexcept { return theta_N_; }
 
  private:
-  S gamma_{0.0};
-  S theta0_N_{0.0};
-  S theta_min_N_{0.0};
-  S theta_max_N_{0.0};
+  SwitchingAdaptationOptions<S> options_{};
   S theta_N_{0.0};
 };
 using SwitchingThetaEstimator = BasicSwitchingThetaEstimator<double>;
@@ -70,7 +64,7 @@ class BasicSlidingSurface {
  public:
   BasicSlidingSurface() = default;
   /// Throws std::invalid_argument for options out of range.
-  BasicSlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions& adaptation)
+  BasicSlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions<>& adaptation)
     requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, tyre_{context.rig.tyre}, equivalent_{context}, theta_{adaptation} {}
 

@@ -19,16 +19,12 @@ double at_least_one(double count) { return std::max(1.0, std::round(count)); }
 }  // namespace
 
 template <class S>
-BasicSlipPeakEstimator<S>::BasicSlipPeakEstimator(const SlipPeakOptions& options, double slip_min, double slip_max,
+BasicSlipPeakEstimator<S>::BasicSlipPeakEstimator(const SlipPeakOptions<>& options, double slip_min, double slip_max,
                                                   double rate_Hz)
   requires std::is_same_v<S, double>
-    : log_force0_{rig::logarithm(options.peak_force0_N)},
+    : options_{options},
+      log_force0_{rig::logarithm(options.peak_force0_N)},
       log_width0_{rig::logarithm(options.peak_slip0)},
-      force_drift_per_s_{options.force_drift_per_s},
-      slip_drift_per_s_{options.slip_drift_per_s},
-      shape_drift_per_s_{options.shape_drift_per_s},
-      jump_part_{options.jump_level},
-      jump_hold_s_{options.jump_hold_s},
       log_slip_min_{rig::logarithm(slip_min)},
       log_slip_max_{rig::logarithm(slip_max)},
       sample_variance_N2_{options.force_noise_N2_s * rate_Hz},

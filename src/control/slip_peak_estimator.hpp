@@ -9,7 +9,7 @@
 //   prediction  P += h diag(force_drift_per_s, slip_drift_per_s, shape_drift_per_s, 0)      h: time step, s
 //   update      S = G P G' + R,  R = force_noise_N2_s times the control rate,  r = F - Fp g,
 //               unknowns += P G' r / S,  P -= (P G') (P G')' / S
-//   jump        |F - F(15 ms ago) - (curve(l) - curve(l 15 ms ago))| > max(3 N, Fp (jump_part_ + |l - l ago| / w))
+//   jump        |F - F(15 ms ago) - (curve(l) - curve(l 15 ms ago))| > max(3 N, Fp (jump_level + |l - l ago| / w))
 //
 // g is the simplest curve that rises to a peak and falls after it, more slowly for larger c. It is not the plant's.
 #pragma once
@@ -35,7 +35,7 @@ class BasicSlipPeakEstimator {
   /// @param slip_min, slip_max  bounds of `width`; 0 < slip_min < slip_max
   /// @param rate_Hz  control cycles per second, > 0
   /// Throws std::invalid_argument for options out of range.
-  BasicSlipPeakEstimator(const SlipPeakOptions& options, double slip_min, double slip_max, double rate_Hz)
+  BasicSlipPeakEstimator(const SlipPeakOptions<>& options, double slip_min, double slip_max, double rate_Hz)
     requires std::is_same_v<S, double>;
 
   void reset() noexcept;
@@ -95,14 +95,9 @@ class BasicSlipPeakEstimator {
   /// Limits the unknowns, and computes what they give.
   void conclude() noexcept;
 
-  // SlipPeakOptions.
+  SlipPeakOptions<S> options_{};
   S log_force0_{0.0};
   S log_width0_{0.0};
-  S force_drift_per_s_{0.0};
-  S slip_drift_per_s_{0.0};
-  S shape_drift_per_s_{0.0};
-  S jump_part_{0.0};
-  S jump_hold_s_{0.0};
   S log_slip_min_{0.0};
   S log_slip_max_{0.0};
   S sample_variance_N2_{0.0};  ///< of one pair, scaled so that the information per second does not depend on the rate
@@ -140,9 +135,9 @@ void BasicSlipPeakEstimator<S>::reset() noexcept {
 template <class S>
 void BasicSlipPeakEstimator<S>::update(const S& dt_s, const S& slip, const S& force_N) noexcept {
   if (!rig::any(dt_s > 0.0)) return;
-  covariance_[log_force][log_force] += force_drift_per_s_ * dt_s;
-  covariance_[log_width][log_width] += slip_drift_per_s_ * dt_s;
-  covariance_[shape][shape] += shape_drift_per_s_ * dt_s;
+  covariance_[log_force][log_force] += options_.force_drift_per_s * dt_s;
+  covariance_[log_width][log_width] += options_.slip_drift_per_s * dt_s;
+  covariance_[shape][shape] += options_.shape_drift_per_s * dt_s;
   const auto holds = hold_s_ > 0.0;
   hold_s_ = rig::select(holds, S(hold_s_ - dt_s), hold_s_);
   keep(!holds, slip, force_N);
@@ -194,7 +189,7 @@ auto BasicSlipPeakEstimator<S>::jumped(const S& slip, const S& force_N) const no
   const S past_force_N = rig::element(kept_force_N_, past);
   const S unexplained = force_N - past_force_N - (this->force_N(slip) - this->force_N(past_slip));
   // The curve is least accurate for long moves along it.
-  const S trusted = jump_part_ + rig::magnitude(S(slip - past_slip)) / width_;
+  const S trusted = options_.jump_level + rig::magnitude(S(slip - past_slip)) / width_;
   return level_known && kept_count_ > window_ &&
          rig::magnitude(unexplained) > rig::larger(S(jump_least_N), S(peak_force_N_ * trusted));
 }
@@ -210,7 +205,7 @@ void BasicSlipPeakEstimator<S>::start_over_after_jump(const Condition& where) no
     covariance_[log_force][i] = rig::select(where, variance, covariance_[log_force][i]);
     covariance_[i][log_force] = covariance_[log_force][i];
   }
-  hold_s_ = rig::select(where, jump_hold_s_, hold_s_);
+  hold_s_ = rig::select(where, options_.jump_hold_s, hold_s_);
   kept_count_ = rig::select(where, S(0.0), kept_count_);
   until_kept_ = rig::select(where, S(0.0), until_kept_);
   jumps_ = rig::select(where, S(jumps_ + 1.0), jumps_);

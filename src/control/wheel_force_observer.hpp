@@ -26,7 +26,7 @@ class BasicWheelForceObserver {
   BasicWheelForceObserver() = default;
   /// @param rate_Hz  control cycles per second, > 0, for the gains; the prediction uses the measured interval
   /// Throws std::invalid_argument for options not > 0.
-  BasicWheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig, double rate_Hz)
+  BasicWheelForceObserver(const ForceObserverOptions<>& options, const rig::RigParameters& rig, double rate_Hz)
     requires std::is_same_v<S, double>;
 
   /// Starts from these speeds with zero force.

@@ -49,7 +49,8 @@ class LowerWheel {
 /// A tyre on a road, seen by the bank with the delays that it has in the controller.
 class Rolling {
  public:
-  explicit Rolling(const rig::TyreParameters& tyre, double zero = 0.0, const control::FrictionBankOptions& options = {})
+  explicit Rolling(const rig::TyreParameters& tyre, double zero = 0.0,
+                   const control::FrictionBankOptions<>& options = {})
       : bank{options, 1.0 / period_s, delay_s}, tyre_{tyre}, zero_{zero} {
     bank.reset({.slip = -zero, .car_speed_m_s = 10.0, .force_N = 0.0});
     late_.settle(-zero);
@@ -62,7 +63,7 @@ class Rolling {
 
   void slip(double reading) {
     const double force = road * tyre_.theta_N * rig::normalised_tyre_force(tyre_, reading + zero_);
-    const double q = -std::expm1(-control::FrictionBankOptions{}.force_bandwidth_rad_s * period_s);
+    const double q = -std::expm1(-control::FrictionBankOptions<>{}.force_bandwidth_rad_s * period_s);
     quick_ += -std::expm1(-period_s / delay_s) * (force - quick_);
     bank.learn({.dt_s = period_s,
                 .slip = reading + (time_s_ < 0.06 ? quick_slip_error : 0.0),
@@ -99,7 +100,7 @@ double used(const Rolling& rolling, const rig::TyreParameters& tyre, double zero
 }  // namespace
 
 TEST_CASE("Before braking the bank's curve is the mean of the magic formulas that it consists of") {
-  const control::FrictionBankOptions o;
+  const control::FrictionBankOptions<> o;
   const control::FrictionBank bank{o, 1000.0, delay_s};
   for (const double slip : {-0.3, -0.01, 0.0, 0.003, 0.02, 0.05, 0.1, 0.25, 0.6, 1.0}) {
     double sum = 0.0, weights = 0.0;
@@ -195,7 +196,7 @@ TEST_CASE("The slip that is read as braking begins holds, the less so the more f
 }
 
 TEST_CASE("A peak behind which the slip runs away is kept at a distance: an expectile of the bank's peaks") {
-  control::FrictionBankOptions o;
+  control::FrictionBankOptions<> o;
   o.past_peak_cost = 7.0;
   const double per_N = 0.02;
   control::FrictionBank bank{o, 1000.0, delay_s};
@@ -226,7 +227,7 @@ TEST_CASE("A peak behind which the slip runs away is kept at a distance: an expe
 
 TEST_CASE("What the last braking has left decides its part of the first weights") {
   const double last = 0.12;
-  const control::FrictionBankOptions o{.last_peak_slip = last};
+  const control::FrictionBankOptions<> o{.last_peak_slip = last};
   const control::FrictionBank bank{o, 1000.0, delay_s};
   double part[2] = {}, logarithm[2] = {};
   for (int j = 0; j < 8; ++j) {
@@ -352,7 +353,7 @@ TEST_CASE("A jump that is seen while the slip is negative leaves the level in it
 }
 
 TEST_CASE("Options of the bank out of range are refused") {
-  const auto made = [](control::FrictionBankOptions o, double rate_Hz = 1e3, double late_s = delay_s) {
+  const auto made = [](control::FrictionBankOptions<> o, double rate_Hz = 1e3, double late_s = delay_s) {
     return control::FrictionBank{o, rate_Hz, late_s};
   };
   CHECK_THROWS_AS(made({.force_noise_N2_s = 0.0}), std::invalid_argument);

@@ -25,7 +25,7 @@ Curve magic(double theta_N, double B, double C) {
 double slip_at(double t, double around, double swing) { return t < 0.1 ? t : around + swing * std::sin(60.0 * t); }
 
 control::SlipPeakEstimator make(double rate_Hz = 1000.0) {
-  return control::SlipPeakEstimator{control::SlipPeakOptions{}, 0.01, 0.3, rate_Hz};
+  return control::SlipPeakEstimator{control::SlipPeakOptions<>{}, 0.01, 0.3, rate_Hz};
 }
 
 void feed(control::SlipPeakEstimator& peak, const Curve& force, double from_s, double to_s, double rate_Hz = 1000.0,
@@ -129,7 +129,7 @@ TEST_CASE("A jump takes the curve back by 30 ms at every rate") {
 }
 
 TEST_CASE("Bounds and drifts that make no sense are refused") {
-  const auto refused = [](const control::SlipPeakOptions& options, double slip_min, double slip_max, double rate_Hz) {
+  const auto refused = [](const control::SlipPeakOptions<>& options, double slip_min, double slip_max, double rate_Hz) {
     CHECK_THROWS_AS((control::SlipPeakEstimator{options, slip_min, slip_max, rate_Hz}), std::invalid_argument);
   };
   refused({}, 0.0, 0.3, 1000.0);

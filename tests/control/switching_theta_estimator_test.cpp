@@ -10,7 +10,7 @@ using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
 
 TEST_CASE("The switching estimate integrates -gamma k phi s between its bounds and never leaves them") {
-  const control::SwitchingAdaptationOptions options{
+  const control::SwitchingAdaptationOptions<> options{
       .gamma = 40.0, .theta0_N = 20.0, .theta_min_N = 15.0, .theta_max_N = 30.0};
   control::SwitchingThetaEstimator theta{options};
   CHECK(theta.theta_N() == 20.0);
@@ -39,7 +39,7 @@ TEST_CASE("The switching estimate integrates -gamma k phi s between its bounds a
 }
 
 TEST_CASE("Options of the switching estimate that are not usable are refused") {
-  using Options = control::SwitchingAdaptationOptions;
+  using Options = control::SwitchingAdaptationOptions<>;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto made = [](const Options& o) { return control::SwitchingThetaEstimator{o}.theta_N(); };
   CHECK_NOTHROW(made(Options{.gamma = 0.0}));

@@ -22,7 +22,7 @@ double force_of(const bench::Setup& s, const bench::Tick& tick) {
 
 /// The observer beside the paper's controller, on the real rig.
 Errors beside(const bench::Setup& s) {
-  control::WheelForceObserver observer{control::ForceObserverOptions{}, s.rig, s.options.rate_Hz};
+  control::WheelForceObserver observer{control::ForceObserverOptions<>{}, s.rig, s.options.rate_Hz};
   Errors errors;
   int count = 0;
   for (const auto& tick : bench::brake(s, "adaptive").ticks) {
@@ -71,7 +71,7 @@ TEST_CASE("A brake stronger than the model says shows as its error, and hardly i
 }
 
 TEST_CASE("The force follows a ramp with the delay that the observer states") {
-  control::WheelForceObserver observer{control::ForceObserverOptions{}, rig::RigParameters{}, 1000.0};
+  control::WheelForceObserver observer{control::ForceObserverOptions<>{}, rig::RigParameters{}, 1000.0};
   const rig::WheelParameters w;
   double omega1 = 150.0, omega2 = 160.0;
   observer.reset({omega1, omega2});

@@ -8,8 +8,9 @@ namespace abs_hil::control {
 // tests compare them.
 
 /// Adaptation of the equivalent control, theta_hat' = -gamma k phi s, where s is the law's substitute for sign(e_v).
+template <class S = double>
 struct SwitchingAdaptationOptions {
-  ABS_HIL_OPTIONS(SwitchingAdaptationOptions);
+  ABS_HIL_LANE_OPTIONS(SwitchingAdaptationOptions, S);
   /// 0: theta_hat keeps the value theta0_N.
   ABS_HIL_OPTION(double, gamma, 5.0, .unit = "kg^2 m/s^3", .meaning = "gain of theta_hat' = -gamma k phi sign(e_v)",
                  .range = rig::from_zero(1e4), .search = rig::search(1, 1000));
@@ -28,7 +29,7 @@ struct SlidingModeOptions {
   /// With it e_v arrives exponentially, and K only has to cover what the estimate leaves over.
   ABS_HIL_OPTION(double, reaching_per_s, 0.0, .unit = "1/s", .meaning = "q of -K sign(e_v) - q e_v",
                  .range = rig::from_zero(1e4));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 55.5});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions<>, adaptation, "", {.gamma = 55.5});
 };
 
 struct SmoothSlidingModeOptions {
@@ -37,7 +38,7 @@ struct SmoothSlidingModeOptions {
                  .range = rig::positive(200), .search = rig::search(0.5, 100));
   ABS_HIL_OPTION(double, boundary_m_s, 2.93, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
                  .range = rig::between(1e-3, 10), .search = rig::search(0.01, 5));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 156.0});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions<>, adaptation, "", {.gamma = 156.0});
 };
 
 struct SuperTwistingOptions {
@@ -46,7 +47,7 @@ struct SuperTwistingOptions {
                  .search = rig::search(0.5, 100));
   ABS_HIL_OPTION(double, k2, 1.69, .unit = "m/s^3", .meaning = "gain of the integral of sign(e_v)",
                  .range = rig::positive(5000), .search = rig::search(1, 2000));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 23.2});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions<>, adaptation, "", {.gamma = 23.2});
 };
 
 struct RelayOptions {
@@ -66,8 +67,9 @@ struct PiOptions {
 };
 
 /// A sum of slip and wheel deceleration that a PI controller holds.
+template <class S = double>
 struct MixedSlipDecelerationOptions {
-  ABS_HIL_OPTIONS(MixedSlipDecelerationOptions);
+  ABS_HIL_LANE_OPTIONS(MixedSlipDecelerationOptions, S);
   ABS_HIL_OPTION(double, weight, 0.0137, .meaning = "weight of the wheel's deceleration in g beside the slip",
                  .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, target, 0.1, .meaning = "wanted sum of slip and weighted deceleration",
@@ -79,8 +81,9 @@ struct MixedSlipDecelerationOptions {
 };
 
 /// Accelerations are those of the wheel's circumference, r1 omega1'. FivePhaseController names the phases.
+template <class S = double>
 struct FivePhaseOptions {
-  ABS_HIL_OPTIONS(FivePhaseOptions);
+  ABS_HIL_LANE_OPTIONS(FivePhaseOptions, S);
   /// Apply or re-apply -> hold.
   ABS_HIL_OPTION(double, hold_below_m_s2, -5.15, .unit = "m/s^2",
                  .meaning = "wheel acceleration below which the torque is held", .range = rig::negative(-500),

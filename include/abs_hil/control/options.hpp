@@ -39,8 +39,9 @@ struct AdaptiveOptions {
 };
 
 /// How fast the unknowns of WheelForceObserver may change: intensities of the white noise on their rates.
+template <class S = double>
 struct ForceObserverOptions {
-  ABS_HIL_OPTIONS(ForceObserverOptions);
+  ABS_HIL_LANE_OPTIONS(ForceObserverOptions, S);
   ABS_HIL_OPTION(double, force_rate_N2_s, 100.0, .unit = "N^2/s",
                  .meaning = "force observer: how fast the tyre force may change", .range = rig::positive(1e9));
   ABS_HIL_OPTION(double, brake_rate_Nm2_s, 0.3, .unit = "(N m)^2/s",
@@ -55,7 +56,7 @@ struct AdaptiveActuatorOptions {
                  .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, lag_weight_s2, 1e-4, .unit = "s^2", .meaning = "weight of that error in the Lyapunov function",
                  .range = rig::positive(1e3));
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
+  ABS_HIL_GROUP(ForceObserverOptions<>, observer, "", {});
 };
 
 /// Sliding mode with a boundary layer, stepped back through the brake's lag.
@@ -68,13 +69,14 @@ struct SlidingModeActuatorOptions {
   ABS_HIL_OPTION(double, lag_gain_per_s, 72.6, .unit = "1/s",
                  .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4),
                  .search = rig::search(10, 500));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 261.0});
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions<>, adaptation, "", {.gamma = 261.0});
+  ABS_HIL_GROUP(ForceObserverOptions<>, observer, "", {});
 };
 
 /// Slip controller that raises the slip while the tyre force still grows with it.
+template <class S = double>
 struct BrakingStiffnessOptions {
-  ABS_HIL_OPTIONS(BrakingStiffnessOptions);
+  ABS_HIL_LANE_OPTIONS(BrakingStiffnessOptions, S);
   ABS_HIL_OPTION(double, memory_s, 0.021, .unit = "s", .meaning = "memory of the slope of force over slip",
                  .range = rig::between(0.002, 10));
   ABS_HIL_OPTION(double, slip_noise, 0.002, .meaning = "spread of the slip that tells nothing of the slope",
@@ -95,12 +97,13 @@ struct BrakingStiffnessOptions {
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, lag_gain_per_s, 46.2, .unit = "1/s",
                  .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 20.1, .brake_rate_Nm2_s = 0.507});
+  ABS_HIL_GROUP(ForceObserverOptions<S>, observer, "", {.force_rate_N2_s = 20.1, .brake_rate_Nm2_s = 0.507});
 };
 
 /// SlipPeakEstimator: initial values of the tyre curve, and how fast they may change.
+template <class S = double>
 struct SlipPeakOptions {
-  ABS_HIL_OPTIONS(SlipPeakOptions);
+  ABS_HIL_LANE_OPTIONS(SlipPeakOptions, S);
   /// Within the controller's bounds of the slip.
   ABS_HIL_OPTION(double, peak_slip0, 0.08, .meaning = "first guess of the peak's slip",
                  .range = rig::open_between(0, 1));
@@ -121,8 +124,9 @@ struct SlipPeakOptions {
 };
 
 /// Slip controller that finds the peak of the tyre force.
+template <class S = double>
 struct AdaptivePeakOptions {
-  ABS_HIL_OPTIONS(AdaptivePeakOptions);
+  ABS_HIL_LANE_OPTIONS(AdaptivePeakOptions, S);
   ABS_HIL_OPTION(double, ks0, 100.0, .unit = "1/s^2", .meaning = "integral gain of the slip loop",
                  .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, ks1, 70.0, .unit = "1/s", .meaning = "proportional gain of the slip loop",
@@ -141,13 +145,14 @@ struct AdaptivePeakOptions {
                  .range = rig::between(0, 0.1));
   ABS_HIL_OPTION(double, search_rad_s, 60.0, .unit = "rad/s", .meaning = "frequency of the search",
                  .range = rig::positive(1000));
-  ABS_HIL_GROUP(SlipPeakOptions, peak, "", {});
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 200.0, .brake_rate_Nm2_s = 3.0});
+  ABS_HIL_GROUP(SlipPeakOptions<S>, peak, "", {});
+  ABS_HIL_GROUP(ForceObserverOptions<S>, observer, "", {.force_rate_N2_s = 200.0, .brake_rate_Nm2_s = 3.0});
 };
 
 /// FrictionBank: what is known of the tyre before braking, and how well its inputs are trusted.
+template <class S = double>
 struct FrictionBankOptions {
-  ABS_HIL_OPTIONS(FrictionBankOptions);
+  ABS_HIL_LANE_OPTIONS(FrictionBankOptions, S);
   ABS_HIL_OPTION(double, force_bandwidth_rad_s, 165.0, .unit = "rad/s",
                  .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000));
   ABS_HIL_OPTION(double, force_noise_N2_s, 0.00356, .unit = "N^2 s",
@@ -214,8 +219,9 @@ struct FrictionBankOptions {
 };
 
 /// Slip controller that finds the peak of the tyre force, and spares the brake.
+template <class S = double>
 struct AdaptiveOptimalOptions {
-  ABS_HIL_OPTIONS(AdaptiveOptimalOptions);
+  ABS_HIL_LANE_OPTIONS(AdaptiveOptimalOptions, S);
   ABS_HIL_OPTION(double, slip_gain_per_s, 58.0, .unit = "1/s", .meaning = "decay of a large slip velocity error",
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, slip_gain_near_per_s, 13.9, .unit = "1/s", .meaning = "decay of a small one",
@@ -257,8 +263,8 @@ struct AdaptiveOptimalOptions {
                  .range = rig::from_zero_below(1));
   ABS_HIL_OPTION(double, search_rad_s, 24.0, .unit = "rad/s", .meaning = "frequency of the search",
                  .range = rig::positive(1000));
-  ABS_HIL_GROUP(FrictionBankOptions, bank, "", {});
-  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 4.0});
+  ABS_HIL_GROUP(FrictionBankOptions<S>, bank, "", {});
+  ABS_HIL_GROUP(ForceObserverOptions<S>, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 4.0});
 };
 
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
@@ -332,12 +338,12 @@ struct ControlOptions {
   ABS_HIL_GROUP(SuperTwistingOptions, super_twisting, "super_twisting.", {});
   ABS_HIL_GROUP(RelayOptions, relay, "relay.", {});
   ABS_HIL_GROUP(PiOptions, pi, "pi.", {});
-  ABS_HIL_GROUP(FivePhaseOptions, five_phase, "five_phase.", {});
+  ABS_HIL_GROUP(FivePhaseOptions<>, five_phase, "five_phase.", {});
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
-  ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
-  ABS_HIL_GROUP(AdaptiveOptimalOptions, adaptive_optimal, "adaptive_optimal.", {});
-  ABS_HIL_GROUP(MixedSlipDecelerationOptions, mixed_slip_deceleration, "mixed_slip_deceleration.", {});
-  ABS_HIL_GROUP(BrakingStiffnessOptions, braking_stiffness, "braking_stiffness.", {});
+  ABS_HIL_GROUP(AdaptivePeakOptions<>, adaptive_peak, "adaptive_peak.", {});
+  ABS_HIL_GROUP(AdaptiveOptimalOptions<>, adaptive_optimal, "adaptive_optimal.", {});
+  ABS_HIL_GROUP(MixedSlipDecelerationOptions<>, mixed_slip_deceleration, "mixed_slip_deceleration.", {});
+  ABS_HIL_GROUP(BrakingStiffnessOptions<>, braking_stiffness, "braking_stiffness.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
   ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
   ABS_HIL_GROUP(OwnOptions, own, "", {});

@@ -190,7 +190,16 @@ inline constexpr int most_row_lines = 128;
 // NOLINTBEGIN(cppcoreguidelines-macro-usage, bugprone-macro-parentheses): they declare members.
 /// Stands before the rows of a struct. `type` is the struct's name.
 #define ABS_HIL_OPTIONS(type) \
+  template <class Value>      \
+  using OptionValue = Value;  \
   using OptionOwner = type;   \
+  static constexpr int option_line = __LINE__
+
+/// The same for a law that runs in lanes: its options of type double are members of type `scalar`.
+#define ABS_HIL_LANE_OPTIONS(type, scalar) \
+  template <class>                         \
+  using OptionValue = scalar;              \
+  using OptionOwner = type;                \
   static constexpr int option_line = __LINE__
 
 /// One option: type, member, default, then members of OptionFacts, as in `.unit = "s", .range = rig::positive(60)`.
@@ -200,7 +209,7 @@ inline constexpr int most_row_lines = 128;
     return ::abs_hil::rig::make_row(&OptionOwner::member, #member, {__VA_ARGS__});                  \
   }                                                                                                 \
   static_assert(__LINE__ - option_line < ::abs_hil::rig::most_row_lines, "too many lines of rows"); \
-  type member = standard
+  OptionValue<type> member = standard
 
 /// A member that is a struct of options: type, member, prefix of its keys (or `rig::not_searched(prefix)`), and its
 /// initialiser in braces.
