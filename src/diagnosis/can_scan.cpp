@@ -1,11 +1,10 @@
 // Looks at the CAN interfaces for `abs_hil doctor`.
-#include "diagnosis/can_scan.hpp"
-
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "diagnosis/doctor.hpp"
 #include "driver/can/protocol.hpp"
 
 namespace abs_hil::diagnosis {

@@ -8,8 +8,6 @@
 #include <thread>
 #include <utility>
 
-#include "diagnosis/can_scan.hpp"
-#include "diagnosis/hm2_scan.hpp"
 #include "diagnosis/machine_facts.hpp"
 #include "telemetry/route_probe.hpp"
 

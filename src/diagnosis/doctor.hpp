@@ -7,7 +7,9 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "diagnosis/finding.hpp"
+#include "driver/can/interface_facts.hpp"
 #include "driver/factory.hpp"
+#include "driver/hm2/hm2_driver.hpp"
 #include "runtime/realtime_setup.hpp"
 
 namespace abs_hil::diagnosis {
@@ -40,5 +42,26 @@ struct Examination {
 /// The result of the examination. All checks: true if the backend can run. A single check: true if nothing in it needs
 /// a fix.
 [[nodiscard]] bool turned_out_well(const Examination& examination, std::span<const Finding> findings);
+
+/// Whether this kernel supports CAN sockets (PF_CAN, raw).
+[[nodiscard]] bool has_can_sockets() noexcept;
+
+/// Findings of the check "can": each interface with its state, its bit rate and the load of a run at `rate_Hz`. A
+/// missing interface, or missing kernel support, is a note. The load of a vcan interface is meaningless.
+[[nodiscard]] std::vector<Finding> judge(const std::vector<driver::can::InterfaceFacts>& interfaces, bool can_sockets,
+                                         double rate_Hz);
+
+/// The load at `rate_Hz` on a bus of 1 Mbit/s and with CAN FD, for a computer without an interface.
+[[nodiscard]] Finding bus_load_finding(double rate_Hz);
+
+/// Findings of the check "hm2": the interface that leads to the board, its ARP entry and coalescing, round trips, and
+/// whether somebody else talks to the board. Reads only.
+[[nodiscard]] std::vector<Finding> scan_hm2(const driver::hm2::Hm2Options& options);
+
+/// One in `times_us` for each answer; `asked` requests. `foreign`: packets that others sent meanwhile.
+[[nodiscard]] Finding judge_round_trips(std::vector<double> times_us, int asked, int foreign);
+
+/// What the kernel's ARP table, as text, has for the address.
+[[nodiscard]] Finding judge_arp(const std::string& table, const std::string& address, const std::string& interface);
 
 }  // namespace abs_hil::diagnosis

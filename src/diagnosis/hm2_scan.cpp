@@ -1,7 +1,5 @@
 // The network between this computer and an hm2 board, as `abs_hil doctor` sees it.
 
-#include "diagnosis/hm2_scan.hpp"
-
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <ifaddrs.h>
@@ -19,6 +17,7 @@
 #include <memory>
 #include <sstream>
 
+#include "diagnosis/doctor.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "abs_hil/rig/time_units.hpp"
-
 namespace abs_hil::guardian {
 
 namespace {

@@ -46,7 +46,7 @@ GuardianSetup set_up() {
   GuardianSetup setup{.launch = parse_launch_config(text_behind(inherited_launch_config))};
   config::KeyTable keys(setup.settings);
   // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
-  config::load_tables(setup.launch.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
+  config::load_tables(setup.launch.run.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
                       "the controller's configuration");
   constexpr double emulator_insist_s = 10.0;
   double& insist_s = setup.settings.guardian.insist_s;

@@ -12,27 +12,28 @@
 namespace abs_hil::guardian {
 
 std::string to_json(const LaunchConfig& config) {
-  return nlohmann::json{{"config_json", config.config_json},
-                        {"experiment", config.experiment},
-                        {"controller", config.controller},
-                        {"plant", config.plant},
-                        {"backend", config.backend},
-                        {"version", config.version},
+  const telemetry::ExperimentInfo& run = config.run;
+  return nlohmann::json{{"config_json", run.config_json},
+                        {"experiment", run.experiment},
+                        {"controller", run.controller},
+                        {"plant", run.plant},
+                        {"backend", run.backend},
+                        {"version", run.version},
                         {"realtime", static_cast<int>(config.realtime)},
                         {"record_prefix", config.record_prefix},
-                        {"signals", config.signals}}
+                        {"signals", run.names.signals}}
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 LaunchConfig parse_launch_config(const std::string& json) try {
   const nlohmann::json object = rig::parse_json(json);
-  return {.config_json = object.at("config_json"),
-          .experiment = object.at("experiment"),
-          .controller = object.at("controller"),
-          .plant = object.at("plant"),
-          .backend = object.at("backend"),
-          .version = object.at("version"),
-          .signals = object.at("signals"),
+  return {.run = {.experiment = object.at("experiment"),
+                  .controller = object.at("controller"),
+                  .plant = object.at("plant"),
+                  .backend = object.at("backend"),
+                  .config_json = object.at("config_json"),
+                  .version = object.at("version"),
+                  .names = {.signals = object.at("signals")}},
           .realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
           .record_prefix = object.at("record_prefix")};
 } catch (const nlohmann::json::exception& error) {
@@ -49,14 +50,7 @@ void write_flight_files(const LaunchConfig& launch, const std::string& channel_p
                                                      .reason = report.reason,
                                                      .reason_value = static_cast<double>(report.silence_ns) * 1e-9,
                                                      .account = std::move(account)},
-                                                    {.experiment = launch.experiment,
-                                                     .controller = launch.controller,
-                                                     .plant = launch.plant,
-                                                     .backend = launch.backend,
-                                                     .config_json = launch.config_json,
-                                                     .version = launch.version,
-                                                     .names = {.phases = {}, .signals = launch.signals}},
-                                                    channel_prefix, problems);
+                                                    launch.run, channel_prefix, problems);
   for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
   for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
 }

@@ -1,23 +1,17 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "guardian/mail.hpp"
 #include "runtime/flight_ring.hpp"
 #include "runtime/realtime_setup.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::guardian {
 
 /// What the controller passes to the guardian when it starts it.
 struct LaunchConfig {
-  std::string config_json{};  ///< the run's effective configuration
-  std::string experiment{};   ///< this and the next four: for the flight recorder's log
-  std::string controller{};
-  std::string plant{};
-  std::string backend{};
-  std::string version{};
-  std::vector<std::string> signals{};  ///< names of the controller's own signals, for the flight recorder's files
+  telemetry::ExperimentInfo run{};  ///< for the flight recorder's files; without names of phases
   runtime::RealtimeMode realtime{runtime::RealtimeMode::prefer};
   std::string record_prefix{};  ///< path prefix of the files that the guardian writes; empty: it writes none
 };

@@ -7,10 +7,7 @@
 
 #include <array>
 #include <cerrno>
-#include <climits>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 #include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"

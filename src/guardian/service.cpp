@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -129,7 +128,8 @@ LeaseTerms read_terms(const std::string& json, const Peer& client) {
   const LaunchConfig launch = parse_launch_config(json);
   config::Settings settings;
   config::KeyTable keys(settings);
-  config::load_tables(launch.config_json, {"driver", "guardian", "telemetry"}, keys, "the controller's configuration");
+  config::load_tables(launch.run.config_json, {"driver", "guardian", "telemetry"}, keys,
+                      "the controller's configuration");
   const std::string prefix = settings.telemetry.channel_prefix;
   return {.timeout_ns = static_cast<std::int64_t>(settings.guardian.timeout_ms * rig::ns_per_ms),
           .board = kept_board(settings.driver),

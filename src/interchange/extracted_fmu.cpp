@@ -19,7 +19,7 @@
 #include <string_view>
 #include <vector>
 
-#include "interchange/refused_file.hpp"
+#include "interchange/foreign_code.hpp"
 
 namespace abs_hil::interchange {
 

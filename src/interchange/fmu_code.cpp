@@ -1,6 +1,4 @@
 // Calls a controller FMU through FMI 2 or 3.
-#include "interchange/fmu_code.hpp"
-
 #include <fmi/fmi2FunctionTypes.h>
 #include <fmi/fmi3FunctionTypes.h>
 #include <fmt/format.h>
@@ -11,8 +9,8 @@
 #include <limits>
 
 #include "interchange/fmu_facts.hpp"
+#include "interchange/foreign_code.hpp"
 #include "interchange/loaded_library.hpp"
-#include "interchange/refused_file.hpp"
 
 namespace abs_hil::interchange {
 

@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <cstddef>
 #include <fstream>
 #include <map>
 #include <pugixml.hpp>
 #include <set>
 #include <sstream>
-#include <string_view>
 
-#include "interchange/refused_file.hpp"
+#include "interchange/foreign_code.hpp"
 #include "rig/parse_toml.hpp"
 
 namespace abs_hil::interchange {

@@ -4,11 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "abs_hil/rig/option.hpp"
-#include "interchange/fmu_code.hpp"
-#include "interchange/library_code.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {

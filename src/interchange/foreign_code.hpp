@@ -1,9 +1,11 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,5 +67,17 @@ struct StepTimes {
 /// Loads a file into this process. Throws std::invalid_argument, which names the file, before anything of a file that
 /// cannot fit runs.
 [[nodiscard]] std::unique_ptr<ForeignCode> load_here(const ForeignSetup& setup);
+
+/// Loads the library of an extracted FMU (ForeignSetup::folder) and makes an instance. Throws std::invalid_argument.
+[[nodiscard]] std::unique_ptr<ForeignCode> load_fmu(const ForeignSetup& setup);
+
+/// Loads the library, checks its functions, the version and the sizes of its interface, and makes a controller. Throws
+/// std::invalid_argument, which names the file and the fix.
+[[nodiscard]] std::unique_ptr<ForeignCode> load_library(const ForeignSetup& setup);
+
+/// Refuses a file, whose name begins the message. Throws std::invalid_argument.
+[[noreturn]] inline void refuse(const std::filesystem::path& file, const std::string& why) {
+  throw std::invalid_argument(fmt::format("{}: {}", file.string(), why));
+}
 
 }  // namespace abs_hil::interchange

@@ -3,7 +3,6 @@
 #include <sys/types.h>
 
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "interchange/foreign_code.hpp"

@@ -1,14 +1,12 @@
 // Calls a controller in a shared library through abs_hil/interchange/controller.h.
-#include "interchange/library_code.hpp"
-
 #include <fmt/format.h>
 
 #include <array>
 #include <cstring>
 #include <string_view>
 
+#include "interchange/foreign_code.hpp"
 #include "interchange/loaded_library.hpp"
-#include "interchange/refused_file.hpp"
 
 namespace abs_hil::interchange {
 

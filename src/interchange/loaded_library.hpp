@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "interchange/refused_file.hpp"
+#include "interchange/foreign_code.hpp"
 
 namespace abs_hil::interchange {
 

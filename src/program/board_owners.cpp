@@ -1,5 +1,3 @@
-#include "program/board_owners.hpp"
-
 #include <dirent.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -11,15 +9,14 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
-#include <cstring>
 #include <memory>
 #include <optional>
-#include <string_view>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
+#include "program/zero_writing.hpp"
 
 namespace abs_hil::program {
 

@@ -12,8 +12,6 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_arguments.hpp"
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"

@@ -8,9 +8,6 @@
 
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_arguments.hpp"
-#include "program/run_progress.hpp"
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
@@ -149,12 +146,7 @@ Action add_compare(cli::Parser& compare, const Words& words) {
                .default_text = "parameters=0.1,theta=0.1,phase"});
   add_config_file(compare, o.sources);
   add_assignments(compare, o.sources);
-  compare.add({.names = "--threads",
-               .to = &o.threads,
-               .help = "number of threads, 0: one for each processor; does not change the results",
-               .type = "N",
-               .range = {0, 1024},
-               .show_default = true});
+  add_threads(compare, o.threads);
   compare.add({.names = "--json", .to = &o.json_file, .help = "write the table as JSON", .type = "FILE"});
   compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
   compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});

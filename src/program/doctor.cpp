@@ -11,8 +11,6 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "guardian/guarding.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_arguments.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"
 #include "runtime/board_policy.hpp"

@@ -9,7 +9,6 @@
 #include "config/config_error.hpp"
 #include "config/rig_file.hpp"
 #include "files/result_file.hpp"
-#include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {

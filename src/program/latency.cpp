@@ -11,8 +11,6 @@
 #include "diagnosis/latency_verdict.hpp"
 #include "experiment/sequence.hpp"
 #include "files/result_file.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_arguments.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 

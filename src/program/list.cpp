@@ -16,7 +16,6 @@
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "driver/factory.hpp"
-#include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {

@@ -4,14 +4,10 @@
 
 #include <filesystem>
 #include <memory>
-#include <utility>
 
 #include "config/config_error.hpp"
-#include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
-#include "replay/check.hpp"
 #include "replay/recorded_run.hpp"
-#include "replay/report.hpp"
 #include "replay/rerun.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"

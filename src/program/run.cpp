@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <optional>
@@ -15,12 +14,10 @@
 
 #include "analysis/run_summary.hpp"
 #include "config/plan.hpp"
-#include "control/adaptive_gains.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
 #include "guardian/guarding.hpp"
-#include "program/exit_status.hpp"
 #include "program/foreign_run.hpp"
 #include "program/questions.hpp"
 #include "program/run_monitor.hpp"

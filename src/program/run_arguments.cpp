@@ -1,5 +1,5 @@
 // The options of a run, each one row.
-#include "program/run_arguments.hpp"
+#include "program/subcommands.hpp"
 
 namespace abs_hil::program {
 
@@ -33,6 +33,15 @@ void add_configuration_options(cli::Parser& parser, config::Sources& o) {
               .help = "slip controller, by name or FILE.so, FILE.fmu or FILE.agent",
               .type = "NAME|FILE"});
   add_assignments(parser, o);
+}
+
+void add_threads(cli::Parser& parser, std::size_t& threads) {
+  parser.add({.names = "--threads",
+              .to = &threads,
+              .help = "number of threads, 0: one for each processor; does not change the results",
+              .type = "N",
+              .range = {0, 1024},
+              .show_default = true});
 }
 
 void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<std::string>& histogram_file) {

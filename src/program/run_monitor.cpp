@@ -29,17 +29,21 @@ std::uint64_t silent_cycles_max(const config::Settings& s) {
 
 }  // namespace
 
+telemetry::ExperimentInfo experiment_info(const config::Configuration& configuration, rig::RunNames names) {
+  const config::Settings& s = configuration.settings;
+  return {.experiment = s.experiment.name,
+          .controller = s.control.controller,
+          .plant = s.plant_name,
+          .backend = s.backend,
+          .config_json = configuration.json,
+          .version = ABS_HIL_VERSION,
+          .names = std::move(names)};
+}
+
 std::string guardian_launch_json(const config::Configuration& configuration, const std::filesystem::path& record_prefix,
                                  const std::vector<std::string>& signals) {
-  const config::Settings& s = configuration.settings;
-  return to_json(guardian::LaunchConfig{.config_json = configuration.json,
-                                        .experiment = s.experiment.name,
-                                        .controller = s.control.controller,
-                                        .plant = s.plant_name,
-                                        .backend = s.backend,
-                                        .version = ABS_HIL_VERSION,
-                                        .signals = signals,
-                                        .realtime = s.realtime.mode,
+  return to_json(guardian::LaunchConfig{.run = experiment_info(configuration, {.signals = signals}),
+                                        .realtime = configuration.settings.realtime.mode,
                                         .record_prefix = record_prefix.string()});
 }
 
@@ -94,19 +98,11 @@ rig::Reason RunMonitor::poll() {
 
 void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, double value, const std::string& account) {
   if (record_prefix_.empty()) return;
-  const config::Settings& s = request.settings;
   const auto records = recorder_.ring().contents();
   std::vector<std::string> problems;
   const auto files = telemetry::write_flight_record(
       record_prefix_, {.records = records, .reason = reason, .reason_value = value, .account = account + '\n'},
-      {.experiment = s.experiment.name,
-       .controller = s.control.controller,
-       .plant = s.plant_name,
-       .backend = s.backend,
-       .config_json = request.json,
-       .version = ABS_HIL_VERSION,
-       .names = names_},
-      s.telemetry.channel_prefix, problems);
+      experiment_info(request, names_), request.settings.telemetry.channel_prefix, problems);
   if (!files.empty()) spdlog::info("flight record: {}", files.front().string());
   for (const std::string& problem : problems) spdlog::error("flight record: {}", problem);
 }

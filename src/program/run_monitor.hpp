@@ -9,9 +9,13 @@
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
 #include "run/run.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::program {
 
+/// What messages and flight record say of the run.
+[[nodiscard]] telemetry::ExperimentInfo experiment_info(const config::Configuration& configuration,
+                                                        rig::RunNames names);
 /// The launch configuration of the run's guardian, as JSON.
 [[nodiscard]] std::string guardian_launch_json(const config::Configuration& configuration,
                                                const std::filesystem::path& record_prefix,

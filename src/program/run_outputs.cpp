@@ -7,6 +7,7 @@
 
 #include "config/config_error.hpp"
 #include "config/prior.hpp"
+#include "program/run_monitor.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -88,14 +89,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                            .telemetry_every_cycles = static_cast<std::uint32_t>(s.telemetry.decimation),
                                            .status_period_s = s.telemetry.status_period_s,
                                            .experiment_period_s = s.telemetry.experiment_period_s},
-                  telemetry::ExperimentInfo{.experiment = s.experiment.name,
-                                            .controller = s.control.controller,
-                                            .plant = s.plant_name,
-                                            .backend = s.backend,
-                                            .config_json = request.json,
-                                            .version = ABS_HIL_VERSION,
-                                            .names = run_.names()},
-                  [this] { return snapshot(); });
+                  experiment_info(request, run_.names()), [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);

@@ -1,12 +1,11 @@
 // Shows how far many runs are, and ends them at the first signal.
-#include "program/run_progress.hpp"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
 
 #include "program/signals.hpp"
+#include "program/study_command.hpp"
 
 namespace abs_hil::program {
 

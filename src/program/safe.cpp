@@ -1,14 +1,11 @@
-#include "program/safe.hpp"
-
+// `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else.
 #include <fmt/format.h>
 #include <poll.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <functional>
 #include <future>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -20,8 +17,6 @@
 #include "config/key_table.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/guarding.hpp"
-#include "program/board_owners.hpp"
-#include "program/exit_status.hpp"
 #include "program/first_place.hpp"
 #include "program/subcommands.hpp"
 #include "program/zero_writing.hpp"
@@ -29,6 +24,14 @@
 namespace abs_hil::program {
 
 namespace {
+
+constexpr double most_insist_s = 3600.0;
+
+/// Options of `abs_hil safe` as typed.
+struct SafeCommand {
+  config::Sources sources{.backend = "rig"};  ///< only the configuration file and the assignments are used
+  double insist_s{3.0};                       ///< how long it tries to verify
+};
 
 // Bounds of everything that may hang, ms.
 constexpr int file_read_within_ms = 20;    ///< then the boards that can be found without the file get their zeros
@@ -274,28 +277,9 @@ bool print(std::string good, std::string bad) {
   return is_there(printed, written_out_within_ms);
 }
 
-}  // namespace
-
-Action add_safe(cli::Parser& parser, const Words&) {
-  const auto o = std::make_shared<SafeCommand>();
-  parser.add({.names = "--config",
-              .to = &o->sources.config_file,
-              .help = "TOML file whose table [driver] names the board",
-              .type = "FILE"});
-  parser.add({.names = "--set",
-              .to = &o->sources.assignments,
-              .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
-              .type = "key=value",
-              .repeated = true});
-  parser.add({.names = "--insist",
-              .to = &o->insist_s,
-              .help = "how long to try to verify the safe state, s",
-              .type = "S",
-              .range = {0.0, most_insist_s},
-              .show_default = true});
-  return [o] { return make_boards_safe(*o); };
-}
-
+/// Ends the runs that drive the boards, too, asks the resident service, verifies, and says what it saw and what to
+/// pull. Zeros go out all the while. Nothing in it waits without a bound. Returns the exit status; if something hangs
+/// it ends the process.
 int make_boards_safe(const SafeCommand& command) {
   const std::int64_t started_ns = driver::monotonic_ns();
   take_first_place();
@@ -346,6 +330,28 @@ int make_boards_safe(const SafeCommand& command) {
   const bool printed = print(std::move(good), std::move(bad));
   if (!zeros.end(threads_end_within_ms) || !printed) std::_Exit(status);
   return status;
+}
+
+}  // namespace
+
+Action add_safe(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<SafeCommand>();
+  parser.add({.names = "--config",
+              .to = &o->sources.config_file,
+              .help = "TOML file whose table [driver] names the board",
+              .type = "FILE"});
+  parser.add({.names = "--set",
+              .to = &o->sources.assignments,
+              .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
+              .type = "key=value",
+              .repeated = true});
+  parser.add({.names = "--insist",
+              .to = &o->insist_s,
+              .help = "how long to try to verify the safe state, s",
+              .type = "S",
+              .range = {0.0, most_insist_s},
+              .show_default = true});
+  return [o] { return make_boards_safe(*o); };
 }
 
 std::optional<int> safe_at_once(int argc, char** argv) {

@@ -7,7 +7,6 @@
 
 #include "commands/sender.hpp"
 #include "config/config_error.hpp"
-#include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
 #include "telemetry/lcm_url.hpp"
 
@@ -73,11 +72,7 @@ Action add_send(cli::Parser& parser, const Words&) {
               .required = true});
   parser.add(
       {.names = "--config", .to = &o->sources.config_file, .help = "TOML file with commands.key_file", .type = "FILE"});
-  parser.add({.names = "--set",
-              .to = &o->sources.assignments,
-              .help = "set any configuration value",
-              .type = "key=value",
-              .repeated = true});
+  add_assignments(parser, o->sources);
   parser.add({.names = "--lcm-url", .to = &o->lcm_url, .help = "LCM network"});
   parser.add({.names = "--timeout",
               .to = &o->timeout_s,

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <ctime>
 #include <memory>
 #include <mutex>
@@ -18,7 +17,6 @@
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
-#include "program/exit_status.hpp"
 #include "program/questions.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"

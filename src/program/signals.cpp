@@ -7,7 +7,7 @@
 #include <atomic>
 #include <csignal>
 
-#include "program/exit_status.hpp"
+#include "program/subcommands.hpp"
 
 namespace abs_hil::program {
 

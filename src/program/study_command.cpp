@@ -10,8 +10,6 @@
 #include <memory>
 
 #include "config/config_error.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_progress.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
@@ -51,12 +49,7 @@ void add_options(StudyCommand& command) {
                       .help = "folder of the results (default: one of the study's name below runs/); with --run that "
                               "of the run",
                       .type = "DIR"});
-  command.parser.add({.names = "--threads",
-                      .to = &command.threads,
-                      .help = "number of threads, 0: one for each processor; does not change the results",
-                      .type = "N",
-                      .range = {0, 1024},
-                      .show_default = true});
+  add_threads(command.parser, command.threads);
   command.parser.add({.names = "--shard",
                       .to = &command.shard,
                       .help = "compute the I-th of N parts only; `merge` puts the parts together",

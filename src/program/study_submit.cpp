@@ -13,8 +13,8 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
-#include "program/exit_status.hpp"
 #include "program/study_command.hpp"
+#include "program/subcommands.hpp"
 #include "study/compute.hpp"
 
 namespace abs_hil::program {

@@ -10,8 +10,6 @@
 #include <cstring>
 #include <filesystem>
 
-#include "program/exit_status.hpp"
-
 namespace abs_hil::program {
 
 namespace {

@@ -13,6 +13,17 @@
 
 namespace abs_hil::program {
 
+/// Exit statuses of the program (docs/experiments.md).
+enum ExitStatus : int {
+  exit_completed = 0,
+  exit_ended_early = 1,    ///< a fault, a limit, a stop command, or recorded data lost
+  exit_usage = 2,          ///< usage or configuration; nothing has moved
+  exit_unavailable = 3,    ///< the backend or a required resource is unavailable
+  exit_hung_up = 129,      ///< SIGHUP, after the safe stop
+  exit_interrupted = 130,  ///< SIGINT, after the safe stop
+  exit_terminated = 143,   ///< SIGTERM, after the safe stop
+};
+
 /// A command line as typed.
 using Words = std::vector<std::string>;
 /// What a subcommand does after the command line is read. Returns the exit status. Throws what program.cpp catches.
@@ -51,9 +62,30 @@ int run(const RunRequest& request);
 /// exit status. Throws as `run`.
 int run_series(const RunOptions& options, const RunRequest& base);
 
+/// `abs_hil safe` for a command line that begins with `safe`, without the time that it takes to build the command lines
+/// of all subcommands. Nothing for any other, for its help, and for a wrong one, after the boards have their zeros.
+[[nodiscard]] std::optional<int> safe_at_once(int argc, char** argv);
+
 /// The exit status for the outcome of a run.
 [[nodiscard]] int status_of(const run::RunOutcome& outcome);
 /// The message for a run that requires real time and did not start.
 [[nodiscard]] std::string realtime_refusal(const runtime::RealtimeReport& report);
+
+// The command line's options of a run, as rows. Subcommands take those that they understand.
+
+/// --backend
+void add_backend_option(cli::Parser& parser, config::Sources& o);
+/// --config
+void add_config_file(cli::Parser& parser, config::Sources& o);
+/// --set
+void add_assignments(cli::Parser& parser, config::Sources& o);
+/// Those that belong to the configuration, not to a single run: --config, --plant, --model, --controller, --set.
+void add_configuration_options(cli::Parser& parser, config::Sources& o);
+/// --threads
+void add_threads(cli::Parser& parser, std::size_t& threads);
+/// --rate, --rt, --histogram
+void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<std::string>& histogram_file);
+/// All of a run's.
+void add_run_options(cli::Parser& parser, RunOptions& o);
 
 }  // namespace abs_hil::program

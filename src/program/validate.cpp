@@ -10,8 +10,6 @@
 #include "config/library.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
-#include "program/exit_status.hpp"
-#include "program/run_arguments.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {

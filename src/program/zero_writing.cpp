@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "driver/monotonic_time.hpp"
-#include "guardian/guarding.hpp"
 
 namespace abs_hil::program {
 

@@ -1,5 +1,3 @@
-#include "replay/check.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 
 #include "abs_hil/message_fields.hpp"
 #include "abs_hil/rig/quantities.hpp"
+#include "replay/rerun.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {

@@ -1,10 +1,9 @@
-#include "replay/report.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "replay/rerun.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {

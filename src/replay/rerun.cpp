@@ -2,7 +2,6 @@
 #include "replay/rerun.hpp"
 
 #include <bit>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>

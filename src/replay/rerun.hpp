@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "abs_hil/rig/cycle_record.hpp"
@@ -39,5 +40,30 @@ enum class WheelFaults : std::uint8_t {
 /// True if in cycle `n` the run ended, or began to end, for a reason that a rerun cannot find and takes from the
 /// recording.
 [[nodiscard]] bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept;
+
+/// Result of `abs_hil replay --check`.
+struct CheckResult {
+  bool equal{true};
+  std::vector<std::string> lines{};  ///< each comparison and its result, as text
+};
+
+/// Runs the recorded configuration again and compares bit by bit:
+/// - open loop, always: the recorded measurements must give the same estimates, phases, reasons and commands;
+/// - simulation, if the recording determines the start of the run: the recorded seed and times must also give the same
+///   encoder counts and true motion; for a run with --fast every telemetry message is compared byte by byte.
+[[nodiscard]] CheckResult check(const RecordedRun& run);
+
+/// The first field in which two messages differ in their bits; empty if there is none.
+struct Difference {
+  std::string field;
+  std::string recorded;
+  std::string computed;
+};
+/// @param with_timing  false: does not compare durations, which no rerun can repeat
+[[nodiscard]] Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing);
+
+/// A table that compares the commands of the replayed controller with those of the recorded one.
+[[nodiscard]] std::string report(const RecordedRun& run, const config::Settings& replayed,
+                                 const std::vector<RerunCycle>& rerun);
 
 }  // namespace abs_hil::replay

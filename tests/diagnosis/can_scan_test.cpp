@@ -1,6 +1,5 @@
-#include "diagnosis/can_scan.hpp"
-
 #include "catch.hpp"
+#include "diagnosis/doctor.hpp"
 
 using namespace abs_hil::diagnosis;
 using abs_hil::driver::can::InterfaceFacts;

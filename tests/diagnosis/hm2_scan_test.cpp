@@ -1,8 +1,7 @@
 // What `abs_hil doctor` makes of ARP tables and round trips.
 
-#include "diagnosis/hm2_scan.hpp"
-
 #include "catch.hpp"
+#include "diagnosis/doctor.hpp"
 
 using namespace abs_hil::diagnosis;
 using Catch::Matchers::Contains;

@@ -77,19 +77,19 @@ TEST_CASE("the memory of another build, or any other descriptor, is refused befo
 }
 
 TEST_CASE("a launch configuration reads back; other text is refused") {
-  const LaunchConfig config{.config_json = R"({"a": {"b": "\"x\""}})",
-                            .experiment = "e",
-                            .controller = "c",
-                            .plant = "p",
-                            .backend = "rig",
-                            .version = "1",
-                            .signals = {"I_m", "zeta_N"},
+  const LaunchConfig config{.run = {.experiment = "e",
+                                    .controller = "c",
+                                    .plant = "p",
+                                    .backend = "rig",
+                                    .config_json = R"({"a": {"b": "\"x\""}})",
+                                    .version = "1",
+                                    .names = {.signals = {"I_m", "zeta_N"}}},
                             .realtime = runtime::RealtimeMode::require,
                             .record_prefix = "/tmp/a b/recorder"};
   const LaunchConfig read = parse_launch_config(to_json(config));
-  CHECK(read.config_json == config.config_json);
+  CHECK(read.run.config_json == config.run.config_json);
   CHECK(read.record_prefix == config.record_prefix);
-  CHECK(read.signals == config.signals);
+  CHECK(read.run.names.signals == config.run.names.signals);
   CHECK(read.realtime == config.realtime);
   CHECK_THROWS_WITH(parse_launch_config("{}"), Catch::Matchers::Contains("not a launch configuration"));
   CHECK_THROWS_WITH(parse_launch_config("nonsense"), Catch::Matchers::Contains("not a launch configuration"));

@@ -1,7 +1,6 @@
 // An FMU's instance: parameters, steps, saved states.
 #include "interchange/fmu/component.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
