@@ -6,7 +6,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <utility>
 
 #include "driver/pci/discovery.hpp"
 #include "runtime/clock.hpp"

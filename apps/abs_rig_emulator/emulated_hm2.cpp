@@ -12,10 +12,8 @@
 #include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <vector>
 
 #include "driver/monotonic_time.hpp"
-#include "emulator/hm2_board.hpp"
 #include "emulator/node_board.hpp"
 
 namespace abs_hil::program {

@@ -8,7 +8,6 @@
 
 #include "control.hpp"
 #include "emulator/can_node.hpp"
-#include "emulator/can_node_faults.hpp"
 
 namespace abs_hil::program {
 

@@ -17,7 +17,6 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "telemetry/hexadecimal.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::commands {

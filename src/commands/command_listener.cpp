@@ -9,13 +9,11 @@
 
 #include <chrono>
 #include <cstring>
-#include <string>
 #include <utility>
 
 #include "rig/formatted_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_url.hpp"
-#include "telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,12 +1,11 @@
 // Reads an effective configuration back from the JSON that a run recorded.
-#include "config/config_json.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
+#include "config/key_table.hpp"
 #include "rig/parse_json.hpp"
 
 namespace abs_hil::config {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 
 #include "config/script.hpp"
 #include "config/settings.hpp"
@@ -14,5 +15,10 @@ namespace abs_hil::config {
 
 /// The JSON Schema (draft 2020-12) of scripts, for editors. It is made from the parser's own grammar.
 [[nodiscard]] nlohmann::ordered_json schema();
+
+/// A plant's file to fill in for a rig of one's own: every key of `plant` with its value in `settings`, its meaning,
+/// unit and range, and where to read it off the rig. It can be given to --plant and --model at once.
+/// @param name  of the rig, for the first lines
+[[nodiscard]] std::string rig_file(const Settings& settings, std::string_view name);
 
 }  // namespace abs_hil::config

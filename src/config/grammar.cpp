@@ -1,7 +1,6 @@
 // The keys of a table as a file may spell them, and the units of its numbers.
 #include "config/grammar.hpp"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>

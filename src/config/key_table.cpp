@@ -9,11 +9,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <type_traits>
-#include <utility>
 
 #include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
-#include "config/config_json.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::config {

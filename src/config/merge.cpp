@@ -19,7 +19,6 @@
 #include "config/library.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
-#include "config/prior.hpp"
 #include "driver/injection/injection.hpp"
 #include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"

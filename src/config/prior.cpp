@@ -1,6 +1,4 @@
 // Reads and writes priors. Their keys and ranges are those of the configuration.
-#include "config/prior.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <system_error>
 
 #include "config/config_error.hpp"
+#include "config/merge.hpp"
 
 namespace abs_hil::config {
 namespace {

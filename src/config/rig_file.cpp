@@ -1,8 +1,7 @@
 // Writes a plant's file with the meaning, unit and range of each key, to be filled in.
-#include "config/rig_file.hpp"
-
 #include <fmt/format.h>
 
+#include "config/explain.hpp"
 #include "config/key_table.hpp"
 
 namespace abs_hil::config {

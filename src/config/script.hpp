@@ -13,7 +13,6 @@
 #include "config/factors.hpp"
 #include "config/grammar.hpp"
 #include "config/key_table.hpp"
-#include "experiment/profile.hpp"
 #include "experiment/sequence.hpp"
 
 // An experiment's file, table by table (docs/experiments.md). Each key is one row: see config/grammar.hpp.

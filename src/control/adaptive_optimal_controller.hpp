@@ -1,8 +1,6 @@
 // Brakes at the unknown peak of friction with as little motion of the brake as possible.
 #pragma once
 
-#include <limits>
-
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"

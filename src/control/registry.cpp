@@ -5,8 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <stdexcept>
-#include <string>
-#include <type_traits>
 #include <vector>
 
 #include "control/adaptive_actuator_controller.hpp"

@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
 
-#include "abs_hil/control/equivalent_control.hpp"
 #include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "diagnosis/machine_facts.hpp"
-#include "telemetry/route_probe.hpp"
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::diagnosis {
 

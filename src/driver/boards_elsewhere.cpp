@@ -3,7 +3,6 @@
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_options.hpp"
-#include "driver/pwm.hpp"
 
 namespace abs_hil::driver {
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdio>
 #include <cstring>
-#include <string>
 
 namespace abs_hil::driver {
 

@@ -1,9 +1,8 @@
-#include "emulator/can_node_faults.hpp"
-
 #include <algorithm>
 #include <array>
 #include <utility>
 
+#include "emulator/can_node.hpp"
 #include "emulator/fault_text.hpp"
 
 namespace abs_hil::emulator {

@@ -5,7 +5,6 @@
 #include "emulator/hm2_board.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace abs_hil::emulator {
 

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 
-#include "emulator/hm2_identity.hpp"
 #include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {

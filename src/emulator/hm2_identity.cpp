@@ -1,10 +1,9 @@
 // What a 7I92 with firmware G540x2 says about itself, and the ways in which a wrong board differs from it.
 
-#include "emulator/hm2_identity.hpp"
-
 #include <algorithm>
 
 #include "emulator/fault_text.hpp"
+#include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {
 

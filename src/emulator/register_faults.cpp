@@ -1,6 +1,5 @@
 #include "emulator/register_faults.hpp"
 
-#include <algorithm>
 #include <array>
 #include <optional>
 

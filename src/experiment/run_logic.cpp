@@ -10,7 +10,7 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
-#include "rig/stamp_error.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::experiment {
 

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "abs_hil/control/options.hpp"
@@ -15,7 +14,7 @@
 #include "experiment/adjustment.hpp"
 #include "experiment/options.hpp"
 #include "experiment/sequence.hpp"
-#include "rig/controller_signal.hpp"
+#include "rig/reason_text.hpp"
 #include "rig/run_names.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abs_hil/rig/measurement.hpp"
@@ -11,11 +15,56 @@
 #include "abs_hil/rig/reason.hpp"
 #include "abs_hil/rig/state_bytes.hpp"
 #include "experiment/end_conditions.hpp"
-#include "experiment/profile.hpp"
 #include "runtime/gate_options.hpp"
 #include "runtime/run_latch.hpp"
 
 namespace abs_hil::experiment {
+
+/// How a profile continues between two points.
+enum class Between : std::uint8_t { line, hold };
+
+/// A value over the time since its phase began. It interpolates between points in order and stays constant before the
+/// first and after the last. Empty: no profile. `at` is real-time safe; everything else happens before the run.
+class Profile {
+ public:
+  struct Point {
+    double time_s{0.0};
+    double value{0.0};
+  };
+
+  Profile() = default;
+  /// Throws std::invalid_argument for times that are not finite or decrease, and for values that are not finite. Two
+  /// points at the same time make a step: the second value holds from then on.
+  explicit Profile(std::vector<Point> points, Between between = Between::line)
+      : points_(std::move(points)), between_(between) {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (!std::isfinite(points_[i].time_s) || !std::isfinite(points_[i].value)) {
+        throw std::invalid_argument("each point of a profile needs a finite time and value");
+      }
+      if (i > 0 && points_[i].time_s < points_[i - 1].time_s) {
+        throw std::invalid_argument("the times of a profile must not decrease");
+      }
+    }
+  }
+
+  [[nodiscard]] bool empty() const noexcept { return points_.empty(); }
+  [[nodiscard]] const std::vector<Point>& points() const noexcept { return points_; }
+  [[nodiscard]] Between between() const noexcept { return between_; }
+  /// Value at that time; the profile must not be empty.
+  [[nodiscard]] double at(double time_s) const noexcept {
+    const auto after = std::upper_bound(points_.begin(), points_.end(), time_s,
+                                        [](double time, const Point& point) { return time < point.time_s; });
+    if (after == points_.begin()) return after->value;
+    const Point& before = *(after - 1);
+    if (after == points_.end() || between_ == Between::hold) return before.value;
+    const double part = (time_s - before.time_s) / (after->time_s - before.time_s);
+    return before.value + part * (after->value - before.value);
+  }
+
+ private:
+  std::vector<Point> points_{};
+  Between between_{Between::line};
+};
 
 /// What sets the brake during a phase.
 enum class BrakeAction : std::uint8_t { released, torque, duty, slip_control };

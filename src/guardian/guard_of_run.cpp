@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "config/config_json.hpp"
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
 #include "guardian/guard.hpp"

@@ -26,7 +26,6 @@
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
-#include "config/config_json.hpp"
 #include "config/key_table.hpp"
 #include "guardian/guardian_program.hpp"
 #include "guardian/guarding.hpp"

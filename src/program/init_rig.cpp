@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "config/config_error.hpp"
-#include "config/rig_file.hpp"
+#include "config/explain.hpp"
 #include "files/result_file.hpp"
 #include "program/subcommands.hpp"
 

@@ -19,7 +19,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
-#include "config/config_json.hpp"
+#include "config/key_table.hpp"
 #include "interchange/foreign_controller.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"

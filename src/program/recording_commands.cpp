@@ -11,7 +11,6 @@
 #include "replay/rerun.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/log_to_csv.hpp"
 
 namespace abs_hil::program {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
-#include "config/prior.hpp"
+#include "config/merge.hpp"
 #include "program/run_monitor.hpp"
 #include "telemetry/lcm_url.hpp"
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "config/config_json.hpp"
 #include "config/key_table.hpp"
 #include "rig/parse_json.hpp"
 #include "telemetry/checked_decode.hpp"

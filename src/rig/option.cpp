@@ -1,10 +1,8 @@
 #include "abs_hil/rig/option.hpp"
 
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 #include "abs_hil/rig/option_check.hpp"
 

@@ -1,9 +1,17 @@
 #pragma once
 
+#include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/overrun_cause.hpp"
-#include "rig/duration_quantiles.hpp"
 
 namespace abs_hil::rig {
+
+/// Quantiles of a duration, us. NaN while there are none.
+struct DurationQuantiles {
+  double p50_us{unknown};
+  double p99_us{unknown};
+  double p99_9_us{unknown};
+  double max_us{unknown};
+};
 
 /// Timing of a run without its start-up cycles.
 struct TimingSummary {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/rig/time_units.hpp"
 #include "runtime/cycle_statistics.hpp"
 
 namespace abs_hil::runtime {

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "abs_hil/rig/cycle_record.hpp"
-#include "rig/duration_quantiles.hpp"
 #include "rig/timing_summary.hpp"
 
 namespace abs_hil::runtime {

@@ -1,6 +1,5 @@
 #include "runtime/encoder_check.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

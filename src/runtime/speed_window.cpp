@@ -7,7 +7,6 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "rig/encoder_scale.hpp"
-#include "rig/stamp_error.hpp"
 
 namespace abs_hil::runtime {
 

@@ -1,6 +1,4 @@
 // Reads LABEL=CONTROLLER{KEY=VALUE,...} over common settings.
-#include "study/contender.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,9 +6,9 @@
 #include <stdexcept>
 
 #include "abs_hil/control/registry.hpp"
-#include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "study/study_script.hpp"
 
 namespace abs_hil::study {
 

@@ -1,7 +1,6 @@
 // Random words by counter, a permutation without memory, and the points of each kind of design.
 #include "study/design.hpp"
 
-#include <array>
 #include <bit>
 #include <boost/random/sobol.hpp>
 

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "config/key_table.hpp"
 
 namespace abs_hil::study {
 

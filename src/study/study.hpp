@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "config/settings.hpp"
-#include "study/contender.hpp"
 #include "study/design.hpp"
 #include "study/study_script.hpp"
 

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,7 +11,6 @@
 
 #include "config/config_error.hpp"
 #include "config/reader.hpp"
-#include "study/contender.hpp"
 
 namespace abs_hil::study {
 

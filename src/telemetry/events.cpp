@@ -2,7 +2,6 @@
 #include "telemetry/events.hpp"
 
 #include <cmath>
-#include <utility>
 
 #include "rig/reason_text.hpp"
 #include "telemetry/csv_text.hpp"

@@ -2,7 +2,6 @@
 #include "telemetry/flight_record.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <exception>
 
 #include "abs_hil/rig/time_units.hpp"
@@ -11,7 +10,6 @@
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/log_outlet.hpp"
-#include "telemetry/wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

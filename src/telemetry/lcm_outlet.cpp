@@ -3,10 +3,6 @@
 #include <limits>
 #include <utility>
 
-#include "telemetry/lcm_url.hpp"
-#include "telemetry/route_probe.hpp"
-#include "telemetry/tcpq_server.hpp"
-
 namespace abs_hil::telemetry {
 namespace {
 

@@ -29,4 +29,32 @@ struct Endpoint {
 /// The environment's LCM_DEFAULT_URL, else udpm://239.255.76.67:7667?ttl=0, which stays within this computer.
 [[nodiscard]] std::string default_lcm_url();
 
+/// Result of a check whether LCM can use a URL on this computer. It runs before LCM, whose own error text misleads.
+struct RouteProbe {
+  bool usable{false};
+  std::string problem;  ///< one line; empty if usable
+  std::string fix;      ///< commands or advice, lines without a final line end; empty if nothing needs a fix
+};
+
+/// For udpm, asks the kernel for a route by a UDP connect(), which sends nothing. Other providers count as usable,
+/// because a check would have side effects; `fix` names what they need. Throws only std::bad_alloc.
+[[nodiscard]] RouteProbe probe_lcm_route(std::string_view url);
+
+// liblcm's tcpq waits without limit for a server that has stopped, both when it connects and when it publishes. These
+// functions check the server first.
+
+/// Answer of a tcpq server to a connection.
+enum class TcpqServer : std::uint8_t {
+  answers,
+  absent,  ///< refused at once: there is no server or no route
+  silent,  ///< no answer in time: it has stopped, its computer is off, or it is not a tcpq server
+};
+
+/// Connects, exchanges greetings as LCM does, and hangs up. Takes `timeout_ms` at most. Not from the real-time thread.
+[[nodiscard]] TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept;
+
+/// True if a message of up to 100 kB can be written to a connection now without waiting for the server. Also true for a
+/// broken connection: the write then fails.
+[[nodiscard]] bool takes_without_waiting(int socket) noexcept;
+
 }  // namespace abs_hil::telemetry

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "telemetry/wall_clock.hpp"
-
 namespace abs_hil::telemetry {
 LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us, double write_period_s)
     : log_(std::in_place, path), path_(std::move(path)), epoch_us_(epoch_us), write_period_s_(write_period_s) {}

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -44,5 +45,11 @@ class LogOutlet : public Outlet {
   std::uint64_t failures_{0};
   int error_number_{0};  ///< errno of the first write that failed
 };
+
+/// Time since 1970 in us, as in LCM's stamps.
+[[nodiscard]] inline std::int64_t wall_clock_us() {
+  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace abs_hil::telemetry

@@ -1,5 +1,4 @@
 // Turns an event log into CSV files, one a channel.
-#include "telemetry/log_to_csv.hpp"
 
 #include <algorithm>
 #include <map>
@@ -13,7 +12,6 @@
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/event_log.hpp"
-#include "telemetry/hexadecimal.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::telemetry {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <exception>
 #include <stdexcept>
-#include <utility>
 
 #include "abs_hil/adjustment_t.hpp"
 #include "files/result_file.hpp"

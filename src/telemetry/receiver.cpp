@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "telemetry/lcm_url.hpp"
-#include "telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

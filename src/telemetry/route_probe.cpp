@@ -1,5 +1,4 @@
 // Asks the kernel whether a URL's network can be reached, before LCM does.
-#include "telemetry/route_probe.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -1,6 +1,4 @@
 // Greets a tcpq server with a time limit, which liblcm lacks.
-#include "telemetry/tcpq_server.hpp"
-
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -10,6 +8,8 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

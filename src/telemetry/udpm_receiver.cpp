@@ -2,7 +2,6 @@
 #include "telemetry/udpm_receiver.hpp"
 
 #include <arpa/inet.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 

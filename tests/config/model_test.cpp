@@ -9,7 +9,6 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
-#include "config/config_json.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "config/plan.hpp"

@@ -1,9 +1,8 @@
-#include "config/rig_file.hpp"
-
 #include <fstream>
 
 #include "catch.hpp"
 #include "config/config_file.hpp"
+#include "config/explain.hpp"
 #include "config/key_table.hpp"
 #include "temporary_folder.hpp"
 

@@ -92,15 +92,3 @@ TEST_CASE("classes say in words what weakens") {
   CHECK(rig::weakens({.safety = rig::weaker_if("false")}, false));
   CHECK_FALSE(rig::weakens({.safety = rig::weaker_if("false")}, true));
 }
-
-TEST_CASE("of two sets of options the stricter one holds, option by option") {
-  runtime::GuardianOptions own{.timeout_ms = 30.0, .insist_s = 0.0};
-  runtime::GuardianOptions asked{.timeout_ms = 20.0, .insist_s = 0.001};
-  runtime::GuardianOptions both = rig::stricter_of(own, asked);
-  CHECK(both.timeout_ms == 20.0);
-  CHECK(both.insist_s == 0.0);
-  both = rig::stricter_of(asked, own);
-  CHECK(both.timeout_ms == 20.0);
-  CHECK(both.insist_s == 0.0);
-  CHECK(rig::stricter_of(own, own).timeout_ms == 30.0);
-}

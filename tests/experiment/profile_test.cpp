@@ -1,4 +1,3 @@
-#include "experiment/profile.hpp"
 
 #include <limits>
 #include <stdexcept>

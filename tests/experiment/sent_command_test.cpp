@@ -10,7 +10,7 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "catch.hpp"
-#include "rig/controller_signal.hpp"
+#include "rig/reason_text.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;

@@ -5,7 +5,6 @@
 
 #include "driver/can/protocol.hpp"
 #include "emulator/can_node.hpp"
-#include "emulator/can_node_faults.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -1,5 +1,3 @@
-#include "study/contender.hpp"
-
 #include <fmt/format.h>
 
 #include <fstream>
@@ -8,6 +6,7 @@
 #include "config/config_error.hpp"
 #include "paper_plan.hpp"
 #include "study/comparison.hpp"
+#include "study/study_script.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil;

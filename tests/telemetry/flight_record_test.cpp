@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "rig/controller_signal.hpp"
+#include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/message_codec.hpp"

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "catch.hpp"
-#include "telemetry/route_probe.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,3 @@
-#include "telemetry/log_to_csv.hpp"
 
 #include <sys/resource.h>
 

@@ -1,5 +1,3 @@
-#include "telemetry/tcpq_server.hpp"
-
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -13,6 +11,7 @@
 
 #include "catch.hpp"
 #include "telemetry/lcm_outlet.hpp"
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <span>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "abs_hil/rig/measurement.hpp"

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -54,25 +53,6 @@ template <class Value>
   } else {
     return facts.safety.weakened_by(static_cast<double>(value));
   }
-}
-
-/// Of two structs of options the one that protects better, option by option; where the class says nothing, `own`.
-template <class Options>
-[[nodiscard]] Options stricter_of(Options own, const Options& asked) {
-  for_each_row<Options>([&](const auto& row) {
-    auto& value = own.*row.member;
-    const auto& other = asked.*row.member;
-    using Value = std::remove_cvref_t<decltype(value)>;
-    const SafetyClass& safety = row.facts.safety;
-    if constexpr (std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>) {
-      if (safety.kind == SafetyClass::Kind::above) value = std::min(value, other);
-      if (safety.kind == SafetyClass::Kind::below) value = std::max(value, other);
-    }
-    if (safety.kind == SafetyClass::Kind::unless || safety.kind == SafetyClass::Kind::text) {
-      if (weakens(row.facts, value) && !weakens(row.facts, other)) value = other;
-    }
-  });
-  return own;
 }
 
 }  // namespace abs_hil::rig

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <type_traits>
 
 /// What plant, laws and metrics need of a real number, so that one source computes both a run of its own (`double`) and

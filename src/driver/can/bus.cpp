@@ -5,7 +5,6 @@
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
-#include <net/if.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -24,7 +23,6 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
-#include "driver/can/protocol.hpp"
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {

@@ -2,13 +2,10 @@
 
 #include "driver/can/can_driver.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "driver/board_kit.hpp"
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {

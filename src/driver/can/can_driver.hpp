@@ -11,7 +11,6 @@
 #include "driver/board_options.hpp"
 #include "driver/can/answer_tracker.hpp"
 #include "driver/can/bus.hpp"
-#include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 
 namespace abs_hil::driver::can {

@@ -9,7 +9,6 @@
 #include "driver/board_kit.hpp"
 #include "driver/can/can_driver.hpp"
 #include "driver/monotonic_time.hpp"
-#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -6,11 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "driver/board_kit.hpp"
 #include "driver/monotonic_time.hpp"
 #include "rig/formatted_text.hpp"
 

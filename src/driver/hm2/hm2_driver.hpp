@@ -14,7 +14,6 @@
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/hm2/board.hpp"
-#include "driver/loss_bucket.hpp"
 
 namespace abs_hil::driver::hm2 {
 

@@ -2,10 +2,7 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "abs_hil/driver/safe_state_writer.hpp"
 #include "driver/hm2/hm2_driver.hpp"

@@ -12,7 +12,6 @@
 #include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"

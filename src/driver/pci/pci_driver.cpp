@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "driver/board_kit.hpp"
-
 namespace abs_hil::driver::pci {
 
 namespace {

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"

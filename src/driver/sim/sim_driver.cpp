@@ -1,12 +1,10 @@
 #include "driver/sim/sim_driver.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <stdexcept>
 #include <string>
 
-#include "driver/board_kit.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {

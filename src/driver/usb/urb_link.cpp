@@ -13,12 +13,9 @@
 #include <cstring>
 #include <ctime>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
-#include "driver/usb/discovery.hpp"
 
 namespace abs_hil::driver::usb {
 

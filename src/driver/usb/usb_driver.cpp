@@ -3,11 +3,9 @@
 #include "driver/usb/usb_driver.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "driver/board_kit.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -9,7 +9,6 @@
 
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
-#include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/urb_link.hpp"

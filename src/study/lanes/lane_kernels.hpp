@@ -1,7 +1,6 @@
 // What the compiled loops over packs take, one for each instruction set and kind of run.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 #include "rig/instruction_sets.hpp"

@@ -1,7 +1,7 @@
 #include "driver/can/answer_tracker.hpp"
 
 #include "catch.hpp"
-#include "driver/loss_bucket.hpp"
+#include "driver/board_kit.hpp"
 
 using namespace abs_hil::driver::can;
 

@@ -15,7 +15,6 @@
 
 #include "driver/can/can_driver.hpp"
 #include "emulator/can_node.hpp"
-#include "emulator/can_node_faults.hpp"
 
 namespace abs_hil::test {
 
