@@ -12,7 +12,7 @@ with c, k and h follows from how they change with the torque, and with d from ho
 lag itself has the rate c31, times the release ratio where the torque falls.
 """
 import dataclasses
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 import scipy.signal
@@ -71,9 +71,10 @@ def amounts(log: Log, motion: Motion, values: Mapping[str, float], flaws: Collec
     the torque's factor grows with c, k and h, and whether the brake alone acts, so that a delay of the inputs is a dead
     time."""
     static, torque = static_torques(log, values), brake_torques(log, values)
-    grows = {FADING.key: lambda: -energy_J(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
-             CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
-             DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
+    grows: dict[str, Callable[[], np.ndarray]] = {
+        FADING.key: lambda: -energy_J(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
+        CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
+        DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
     return {key: of() for key, of in grows.items() if key in flaws}
 
 
