@@ -62,13 +62,11 @@ AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       period_s_{1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
-      learns_every_{std::max(1.0, std::round(context.options.rate_Hz / learning_rate_Hz))} {
-  const auto& o = options_;
-  loop_ = loop(o, context.rig);
-  observer_ = {o.observer, context.rig, context.options.rate_Hz};
-  force_ = {context.rig.wheels, o.bank.force_bandwidth_rad_s};
-  bank_ = {o.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()};
-}
+      loop_{loop(options_, context.rig)},
+      observer_{options_.observer, context.rig, context.options.rate_Hz},
+      force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
+      learns_every_{std::max(1.0, std::round(context.options.rate_Hz / learning_rate_Hz))},
+      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 template <class S>
 void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
