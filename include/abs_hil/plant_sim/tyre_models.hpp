@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <variant>
 
 #include "abs_hil/plant_sim/options.hpp"
@@ -13,10 +14,14 @@
 // 1 - k |v_x - v_wheel|, at least 0, with k of plant.friction_fall_s_m.
 namespace abs_hil::plant_sim {
 
+/// A shape with that factor. Lanes skip it where no plant has it; alone the branch costs more than it saves.
 template <class S>
-[[nodiscard, gnu::always_inline]] inline S sliding_factor(const S& fall_s_m, const S& v_wheel_m_s,
-                                                          const S& v_x_m_s) noexcept {
-  return rig::larger(S(0.0), S(1.0 - fall_s_m * rig::magnitude(S(v_x_m_s - v_wheel_m_s))));
+[[nodiscard, gnu::always_inline]] inline S fallen(const S& shape, const S& fall_s_m, const S& v_wheel_m_s,
+                                                  const S& v_x_m_s) noexcept {
+  if constexpr (!std::is_same_v<S, double>) {
+    if (!rig::any(fall_s_m > 0.0)) return shape;
+  }
+  return shape * rig::larger(S(0.0), S(1.0 - fall_s_m * rig::magnitude(S(v_x_m_s - v_wheel_m_s))));
 }
 
 /// The paper's curve (4): sin(C atan(B slip)), slip (5). `S` is a `double`, or a pack of them (rig/scalar.hpp).
@@ -37,9 +42,9 @@ class BasicMagicFormula {
   [[nodiscard]] S shape(const S& slip) const noexcept { return rig::magic_formula(C_, S(B_ * slip), S(1.0)); }
   /// `shape` of the slip at these speeds, with one division for slip and arctangent.
   [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
-    return rig::magic_formula(C_, S(B_ * (v_x_m_s - v_wheel_m_s)),
-                              rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_)) *
-           sliding_factor(fall_s_m_, v_wheel_m_s, v_x_m_s);
+    const S shape = rig::magic_formula(C_, S(B_ * (v_x_m_s - v_wheel_m_s)),
+                                       rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_));
+    return fallen(shape, fall_s_m_, v_wheel_m_s, v_x_m_s);
   }
   /// Friction coefficient at the peak of the curve.
   [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
@@ -79,7 +84,7 @@ class BasicIntecoMu {
     return rig::with_sign(S(rig::larger(S(0.0), friction_coefficient(s)) / peak_mu_), slip);
   }
   [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
-    return shape(slip(v_wheel_m_s, v_x_m_s)) * sliding_factor(fall_s_m_, v_wheel_m_s, v_x_m_s);
+    return fallen(shape(slip(v_wheel_m_s, v_x_m_s)), fall_s_m_, v_wheel_m_s, v_x_m_s);
   }
   [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
   [[nodiscard]] S steepest_s_m(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
