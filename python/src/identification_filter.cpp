@@ -143,9 +143,8 @@ Covariance factor_of(const Covariance& P) {
 
 /// The Kalman filter over one piece. The estimate of the state is affine in the change of the parameters, and so is
 /// each innovation: the normal equations of the parameters follow from one pass.
-/// @param change  of the parameters, for `passed`; both may be null. With it, no normal equations follow: the states
-/// are
-///                those at this change
+/// @param change  of the parameters, for `passed`; both may be null. With it the states are those at this change, and
+///                no normal equations follow
 Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance, const Eigen::VectorXd* change,
                 std::vector<Passed>* passed) {
   const std::ptrdiff_t p = piece.parameters;
