@@ -229,7 +229,8 @@ def sentence(causes: Sequence[Found], fit: Fit) -> str:
     surest = causes[0]
     log, phase = _where(surest.cause, fit)
     also = ', '.join(dict.fromkeys(one.words for one in causes[1:3] if one.words != surest.words))
-    why = f'The parameter plant.{surest.cause.flaw} does not explain it' if surest.cause.flaw else 'The plant has no parameter for it'
+    flaw = surest.cause.flaw
+    why = f'The parameter plant.{flaw} does not explain it' if flaw else 'The plant has no parameter for it'
     return (f'the logs do not fit this plant: {surest.words} ({surest.coefficient:.3g} {surest.cause.unit}, '
             f'{surest.sure:.0f} standard deviations from none), most in {log}{f", phase {phase}" if phase else ""}. '
             f'{why}{f"; {also} would show so as well" if also else ""}')
