@@ -26,19 +26,23 @@ from abs_hil.identification.advice import log_of  # noqa: E402
 FLAWS = {'fading': ('brake_fading_per_J', 1e-4, 4e-4), 'dead time': ('brake_dead_time_s', 1e-3, 6e-3),
          'hysteresis': ('brake_hysteresis', 0.03, 0.12), 'rate limit': ('brake_rate_limit_Nm_s', 60.0, 140.0),
          'eccentric disc': ('upper_encoder_eccentricity_rad', 1e-3, 4e-3), 'release': ('brake_release_ratio', 0.6, 1.8),
+         'cooling': ('brake_cooling_per_s', 0.15, 0.5), 'slots': ('upper_encoder_slot_error_counts', 0.15, 0.5),
          'curved map': ('brake_curvature', -0.2, 0.3), 'falling friction': ('friction_fall_s_m', 0.005, 0.03)}
-#: of rigs with equations of their own: arguments of other_rig.driven, and the plant's parameter that has this value, or the
-#: words that a refusal must hold
-OTHERS = {'two lags': ({'release': 1.5}, 'brake_release_ratio'), 'bent map': ({'curvature': 0.2}, 'brake_curvature'),
-          'friction by sliding speed': ({'by_sliding_s_m': 0.02}, 'friction_fall_s_m'),
+#: of rigs with equations of their own: arguments of other_rig.driven, and the plant's parameters that have these values, or
+#: the words that a refusal must hold
+OTHERS = {'two lags': ({'release': 1.5}, {'brake_release_ratio': 1.5}), 'bent map': ({'curvature': 0.2}, {'brake_curvature': 0.2}),
+          'friction by sliding speed': ({'by_sliding_s_m': 0.02}, {'friction_fall_s_m': 0.02}),
           'friction by car speed': ({'by_speed_s_m': 0.01}, "changes with the lower wheel's speed"),
-          'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0}, 'brake_fading_per_J')}
+          'unequal slots': ({'slots': 0.3}, {'upper_encoder_slot_error_counts': 0.3}),
+          'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0},
+                               {'brake_fading_per_J': 4e-4, 'brake_cooling_per_s': 0.25})}
 #: features of each kind, joined by " + "
 KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc', 'fading + dead time', 'hysteresis + rate limit',
          'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time',
-         'release', 'curved map', 'falling friction', 'release + curved map + fading')
+         'release', 'curved map', 'falling friction', 'release + curved map + fading', 'fading + cooling', 'slots',
+         'quiet + slots')
 KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed', 'two lags + quiet',
-                   'friction by car speed', 'brake that cools')
+                   'friction by car speed', 'brake that cools', 'unequal slots')
 
 
 def one(plant, kind, seed, keep=None):
@@ -75,10 +79,11 @@ def tried(plant, kind, seed):
             values = {key.removeprefix('plant.'): value for key, value in settings.items()}
             log = driven(log, values, random, wander=0.0 if 'quiet' in features else 1.0, **lacks)
         logs.append(log)
-    truth.update({key: next(iter(arguments.values())) for arguments, key in others if key in values_of(plant)})
+    for _, known in others:
+        truth.update(known if isinstance(known, dict) else {})
     found = abs_hil.identify(logs, plant, seed=seed)
     held = [e.low <= truth[key] <= e.high for key, e in found.parameters.items() if key in truth and e.low is not None]
-    cause = next((words for _, words in others if words not in truth), '')
+    cause = next((words for _, words in others if isinstance(words, str)), '')
     return bool(found.undecided or found.form == form.name), int(sum(held)), len(held), found.misfit, cause
 
 

@@ -18,13 +18,14 @@ PER_COUNT_RAD = 2 * math.pi / 4096
 
 
 def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_sliding_s_m=0.0, by_speed_s_m=0.0,
-           fading_per_J=0.0, cools_in_s=math.inf):
+           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
     curvature: share of the straight map that a small torque lacks; by_sliding_s_m, by_speed_s_m: by how much of itself the
     friction falls for each m/s between the wheels' surfaces, and of the lower one; fading_per_J: share of the brake's
-    torque lost for each joule in it, which leaves it over `cools_in_s`
+    torque lost for each joule in it, which leaves it over `cools_in_s`; slots: by how much of a count every second edge of the
+    upper disc comes late
     """
     v = values
     angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
@@ -52,7 +53,8 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
 
     counts = np.zeros((len(log), 2))
     for row in range(len(log)):
-        counts[row] = math.floor(angle1 / PER_COUNT_RAD), math.floor(angle2 / PER_COUNT_RAD)
+        pairs, part = divmod(angle1 / PER_COUNT_RAD, 2.0)
+        counts[row] = 2 * pairs + (part >= 1.0 + slots), math.floor(angle2 / PER_COUNT_RAD)
         if row + 1 == len(log):
             break
         interval = log.time_s[row + 1] - log.time_s[row]

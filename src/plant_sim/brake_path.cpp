@@ -1,4 +1,4 @@
-// Dead time, curved map, fading and hysteresis of the brake.
+// Dead time, curved map, fading, cooling and hysteresis of the brake.
 #include "plant_sim/brake_path.hpp"
 
 #include <algorithm>
@@ -20,6 +20,7 @@ BrakePath::BrakePath(const BrakeFlaws& flaws, double full_Nm, bool ideal_actuato
     : dead_time_s_(flaws.dead_time_s),
       hysteresis_(ideal_actuator ? 0.0 : flaws.hysteresis),
       fading_per_J_(ideal_actuator ? 0.0 : flaws.fading_per_J),
+      cooling_per_s_(flaws.cooling_per_s),
       curvature_(ideal_actuator || !(full_Nm > 0.0) ? 0.0 : flaws.curvature),
       full_Nm_(full_Nm),
       release_ratio_(ideal_actuator ? 1.0 : flaws.release_ratio),
@@ -27,7 +28,7 @@ BrakePath::BrakePath(const BrakeFlaws& flaws, double full_Nm, bool ideal_actuato
 
 void BrakePath::start() noexcept {
   first_ = count_ = 0;
-  time_s_ = newest_ = duty_ = held_Nm_ = energy_J_ = 0.0;
+  time_s_ = newest_ = duty_ = held_Nm_ = heat_J_ = 0.0;
 }
 
 void BrakePath::command(double duty) noexcept {
@@ -52,16 +53,22 @@ double BrakePath::part_s(double left_s, double max_step_s) const noexcept {
 
 double BrakePath::transmitted_Nm(double static_Nm, double part_s, double power_W) noexcept {
   // Fading acts as it is in the part's middle.
-  const double taken_J = energy_J_ + 0.5 * part_s * power_W;
-  const double target_Nm = static_Nm * (1.0 + rig::exponential_less_one(-fading_per_J_ * taken_J));
+  const double heat_J = heat_J_ * (1.0 + cooled(part_s)) + 0.5 * part_s * power_W;
+  const double target_Nm = static_Nm * (1.0 + rig::exponential_less_one(-fading_per_J_ * heat_J));
   held_Nm_ = std::clamp(held_Nm_, (1.0 - hysteresis_) * target_Nm, (1.0 + hysteresis_) * target_Nm);
   return held_Nm_;
 }
 
 void BrakePath::pass(double part_s, double energy_J) noexcept {
   time_s_ += part_s;
-  energy_J_ += energy_J;
+  // The energy comes in in the part's middle.
+  const double kept = 1.0 + cooled(part_s);
+  heat_J_ = (heat_J_ * kept + energy_J) * kept;
   settle();
+}
+
+double BrakePath::cooled(double part_s) const noexcept {
+  return rig::exponential_less_one(-0.5 * cooling_per_s_ * part_s);
 }
 
 void BrakePath::settle() noexcept {

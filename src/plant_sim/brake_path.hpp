@@ -9,8 +9,8 @@
 
 namespace abs_hil::plant_sim {
 
-/// What a real brake does to its command before the lag (6): dead time, a curved map, fading by the energy it has
-/// taken, and the hysteresis of a cable; and by how much faster it lets go. Real-time safe except for the constructor.
+/// What a real brake does to its command before the lag (6): dead time, a curved map, fading by the heat that is
+/// in it, and the hysteresis of a cable; and by how much faster it lets go. Real-time safe except for the constructor.
 class BrakePath {
  public:
   /// @param full_Nm  b(1)
@@ -47,7 +47,7 @@ class BrakePath {
   void pass(double part_s, double energy_J) noexcept;
 
   void exchange_state(rig::StateBytes& state) {
-    state(changes_, first_, count_, time_s_, newest_, duty_, held_Nm_, energy_J_);
+    state(changes_, first_, count_, time_s_, newest_, duty_, held_Nm_, heat_J_);
   }
 
  private:
@@ -58,12 +58,15 @@ class BrakePath {
 
   [[nodiscard]] bool delays() const noexcept { return !changes_.empty(); }
   [[nodiscard]] bool fades() const noexcept { return fading_per_J_ > 0.0; }
+  /// Factor, less 1, over the heat that half of a part leaves.
+  [[nodiscard]] double cooled(double part_s) const noexcept;
   [[nodiscard]] const Change& next() const noexcept { return changes_[first_]; }
   void settle() noexcept;
 
   double dead_time_s_;
   double hysteresis_;
   double fading_per_J_;
+  double cooling_per_s_;
   double curvature_;
   double full_Nm_;
   double release_ratio_;
@@ -74,7 +77,7 @@ class BrakePath {
   double newest_{0.0};  ///< duty of the last command
   double duty_{0.0};
   double held_Nm_{0.0};  ///< behind the hysteresis
-  double energy_J_{0.0};
+  double heat_J_{0.0};
 };
 
 }  // namespace abs_hil::plant_sim

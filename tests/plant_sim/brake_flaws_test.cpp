@@ -168,6 +168,31 @@ TEST_CASE("A brake fades by the energy that it has taken from its wheel") {
   CHECK_THAT(plant.state().brake_torque_Nm, WithinRel(T0, 1e-2));  // cold again
 }
 
+TEST_CASE("A brake that cools keeps less of the heat by which it fades") {
+  // Its wheel turns so fast that the power P = T0 w does not depend on the fading within the digits compared. Braking
+  // for t1 leaves E = P (1 - exp(-q t1)) / q; after a rest t2 the share exp(-q t2) of it is left.
+  constexpr double q = 0.8;
+  constexpr double k = 1e-14;
+  PlantOptions options = wheels_apart();
+  options.rig.wheels.J1_kg_m2 = 1.0;
+  options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
+  options.rig.brake.c31_per_s = 1000.0;
+  options.brake_flaws.fading_per_J = k;
+  options.brake_flaws.cooling_per_s = q;
+  const double tick_s = GENERATE(1e-3, 0.4);
+  Plant plant(options);
+  constexpr double w = 1e9;
+  plant.reset({.omega1_rad_s = w, .omega2_rad_s = w});
+  const double T0 = static_Nm(options, 0.8);
+  const auto faded = [&](double torque_Nm) { return -std::log(torque_Nm / T0) / k; };
+  const double heat_J = T0 * w * (1.0 - std::exp(-q * 2.0)) / q;
+  CHECK_THAT(faded(torque_after(plant, 2.0, tick_s, 0.8)), WithinRel(heat_J, 2e-3));
+  torque_after(plant, 3.0, tick_s, 0.0);
+  // The lag keeps 1 ms of the new power away, and the torque 1 ms behind its target.
+  const double again_J = heat_J * std::exp(-q * 3.02) + T0 * w * 0.018;
+  CHECK_THAT(faded(torque_after(plant, 0.02, 1e-3, 0.8)), WithinRel(again_J, 3e-3));
+}
+
 TEST_CASE("A brake lets go at a rate of its own, within the limit of its rate and after the dead time too") {
   PlantOptions options = endless_wheel();
   const double ratio = GENERATE(0.5, 1.0, 1.8);
@@ -222,8 +247,12 @@ TEST_CASE("An ideal actuator has no flaws") {
   PlantOptions options = endless_wheel();
   options.ideal_actuator = true;
   options.rig.brake.brake_rate_limit_Nm_s = 1.0;
-  options.brake_flaws = {
-      .dead_time_s = 0.1, .hysteresis = 0.3, .fading_per_J = 0.01, .curvature = 0.5, .release_ratio = 3.0};
+  options.brake_flaws = {.dead_time_s = 0.1,
+                         .hysteresis = 0.3,
+                         .fading_per_J = 0.01,
+                         .cooling_per_s = 1.0,
+                         .curvature = 0.5,
+                         .release_ratio = 3.0};
   Plant plant(options);
   plant.reset(rolling_at_170);
   plant.advance(0.01, {.brake_torque_Nm = 3.0});

@@ -69,6 +69,9 @@ struct BrakeFlaws {
   ABS_HIL_OPTION(double, fading_per_J, 0.0, .unit = "1/J",
                  .meaning = "simulation: share of the brake torque lost per joule that the brake has taken",
                  .range = rig::from_zero(0.1));
+  ABS_HIL_OPTION(double, cooling_per_s, 0.0, .unit = "1/s",
+                 .meaning = "simulation: share of the heat, by which the brake fades, that leaves it per second",
+                 .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, curvature, 0.0,
                  .meaning = "simulation: share of b(u) that a small torque lacks; none at duty 1",
                  .range = rig::between(-0.9, 0.9));

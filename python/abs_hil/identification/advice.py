@@ -66,7 +66,7 @@ def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[
             log = log_of(name, plant_settings(found))
         except ValueError:
             continue  # this rig cannot do it, for instance because it never gets fast enough
-        added = _information(fit, log, WINDOW_S if found.disturbances is None else WINDOW_DISTURBED_S, disturbances)
+        added = information(fit, log, WINDOW_S if found.disturbances is None else WINDOW_DISTURBED_S, disturbances)
         total = present + added[np.ix_(free, free)]
         after = np.sqrt(np.diag(np.linalg.inv(total)))
         gain = float(np.linalg.slogdet(total)[1] - np.linalg.slogdet(present)[1])
@@ -75,12 +75,12 @@ def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[
     return sorted(all_of_them, key=lambda one: -one.gain)
 
 
-def _information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances) -> np.ndarray:
+def information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances) -> np.ndarray:
     """The information of one more log at the estimate, in the scaled changes of `fit`."""
     old = fit.problem
     motion = motion_of(log, old.counts_per_rev)
     problem = Problem(old.form, old.base, [log], [motion], [segments_of(log, motion)], old.given, old.fixed,
-                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, ())
+                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, (), old.flaws)
     values = {key: value for key, value in fit.values.items() if not key.startswith('brake_factor')}
     other = Fit(problem, values, pieces_of(problem, values, window_s), disturbances, window_s,
                 np.array([p.key not in old.fixed and p.key != 'u0' for p in problem.parameters]))

@@ -1,14 +1,14 @@
 """The brake's torque, and flaws of the brake that the plant has (docs/plants.md) and that are fitted where the logs show them.
 
-Dead time d, curvature c, fading k and hysteresis h change the torque that the duty u asks for, before the lag (6):
+Dead time d, curvature c, fading k, cooling q and hysteresis h change the torque that the duty u asks for, before the lag (6):
 
     b(t)    static torque of u(t - d) by (7)
     m(t)    b (1 + c (b / b(1) - 1))
-    f(t)    m exp(-k E),  E the energy that the brake has taken since the log began, J
+    f(t)    m exp(-k E),  E' = T w - q E the heat in the brake since the log began, J: of its torque T at the wheel's speed w
     y(t)    f pulls y along only from outside of (1 - h) f ... (1 + h) f
 
 The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. How its readings change
-with c, k and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`. The
+with c, k, q and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`. The
 lag itself has the rate c31, times the release ratio where the torque falls.
 """
 import dataclasses
@@ -18,7 +18,7 @@ import numpy as np
 import scipy.signal
 
 from .logs import Log, Motion
-from .parameters import CURVATURE, DEAD_TIME, FADING, FLAWS, HYSTERESIS, RATE_LIMIT, RELEASE
+from .parameters import COOLING, CURVATURE, DEAD_TIME, FADING, FLAWS, HYSTERESIS, RATE_LIMIT, RELEASE
 
 
 def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
@@ -59,8 +59,8 @@ def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[L
     target = _late(log, target, values.get(DEAD_TIME.key, 0.0))
     if fading := values.get(FADING.key, 0.0):
         asked = target
-        for _ in range(3):  # the energy depends on the fading, weakly
-            target = asked * np.exp(-fading * energy_J(_asking(log, target, values), motion, {**values, 'u0': 0.0}))
+        for _ in range(3):  # the heat depends on the fading, weakly
+            target = asked * np.exp(-fading * heat_J(_asking(log, target, values), motion, {**values, 'u0': 0.0}))
     if hysteresis := values.get(HYSTERESIS.key, 0.0):
         target = _hanging(target, hysteresis)
     return _asking(log, target, values), {**values, 'u0': 0.0}
@@ -68,11 +68,12 @@ def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[L
 
 def amounts(log: Log, motion: Motion, values: Mapping[str, float], flaws: Collection[str]) -> dict[str, np.ndarray]:
     """Of log and values as `with_flaws` gives them, at each row, for those of `flaws` that act on the duties: by how much
-    the torque's factor grows with c, k and h, and whether the brake alone acts, so that a delay of the inputs is a dead
+    the torque's factor grows with c, k, q and h, and whether the brake alone acts, so that a delay of the inputs is a dead
     time."""
     static, torque = static_torques(log, values), brake_torques(log, values)
     grows: dict[str, Callable[[], np.ndarray]] = {
-        FADING.key: lambda: -energy_J(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
+        FADING.key: lambda: -heat_J(log, motion, values),
+        COOLING.key: lambda: _recovered(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
         CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
         DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
     return {key: of() for key, of in grows.items() if key in flaws}
@@ -83,10 +84,22 @@ def full_Nm(values: Mapping[str, float]) -> float:
     return max(values['b1_Nm'] + values['b2_Nm'], 1e-9)
 
 
-def energy_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
-    """What the brake has taken since the log began, at each row."""
+def heat_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
+    """E at each row."""
     power = brake_torques(log, values) * np.where(motion.stands[:, 0], 0.0, np.maximum(motion.speed_rad_s[:, 0], 0.0))
-    return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(log.time_s))])
+    return _cooling(log, values, power)
+
+
+def _recovered(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
+    """-k dE/dq."""
+    return values.get(FADING.key, 0.0) * _cooling(log, values, heat_J(log, motion, values))
+
+
+def _cooling(log: Log, values: Mapping[str, float], comes: np.ndarray) -> np.ndarray:
+    """x of x' = comes - q x, from 0, at each row. What comes between two rows comes in the middle."""
+    keeps = float(np.exp(-values.get(COOLING.key, 0.0) * log.period_s))
+    comes = np.concatenate([[0.0], 0.5 * (comes[1:] + comes[:-1]) * np.diff(log.time_s)])
+    return np.asarray(scipy.signal.lfilter([np.sqrt(keeps)], [1.0, -keeps], comes))
 
 
 def fallen(target: np.ndarray) -> np.ndarray:

@@ -155,6 +155,12 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     if RATE_LIMIT.key not in parameters:
         parameters[RATE_LIMIT.key] = _no_rate_limit(fit, notes, cures)
     parameters.update(_discs(finished, notes))
+    for wheel, slots in problem.slots.items():
+        reach = intervals.WIDTH * slots.sd_counts
+        parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate(
+            slots.error_counts, slots.error_counts - reach, slots.error_counts + reach,
+            'identified' if slots.sd_counts <= LARGEST_SD * slots.error_counts else 'not-identifiable', '1')
+        notes.append(f'every second edge of the {wheel} encoder comes late by {slots.error_counts:.2g} of a count')
     combinations: dict[str, Estimate] = {}
     for name, (unit, parts, cure) in COMBINATIONS.items():
         if any(part not in parameters for part in parts):

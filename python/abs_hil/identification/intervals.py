@@ -8,8 +8,9 @@ import numpy as np
 
 from ..core import _core
 from .linear import filtered, solved
-from .parameters import COMBINATIONS
+from .parameters import COMBINATIONS, WHEELS
 from .problem import QUIET, Fit
+from .slots import middles
 
 REPLICATES = 80
 _BATCH = 20
@@ -33,6 +34,7 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     per_count = problem.radians_per_count
     random = np.random.default_rng(seed)
     phases = random.uniform(size=(len(problem.logs), 2, REPLICATES))
+    late = np.array([[[problem.slots[wheel].error_counts if wheel in problem.slots else 0.0] for wheel in WHEELS]])
     estimates = []
     for begin in range(0, REPLICATES, _BATCH):
         check()
@@ -42,7 +44,8 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
         for piece in fit.pieces:
             exact = piece.linear['read'] / per_count
             phase = chosen[piece.log][None]
-            residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
+            from_edge = exact + phase * np.where(late > 0.0, 2.0, 1.0)
+            residual = (middles(from_edge, late) - from_edge) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros((*piece.states.shape, chosen.shape[2]))}
             changed.update(_core.condense(changed))
             found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]

@@ -60,12 +60,13 @@ RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop o
 #: flaws of brake and tyre; fitted where the logs show them (structure.py). The prior is wide: it must not hold them at
 #: `none`. Those that act as "flaw" change the duties that the fit simulates (brake_flaws.py), the others its plant
 FADING = Parameter('brake_fading_per_J', '1/J', 'flaw', '', floor=1e-4, most=0.1, prior=20.0)
+COOLING = Parameter('brake_cooling_per_s', '1/s', 'flaw', '', floor=0.05, most=10.0, prior=20.0)
 HYSTERESIS = Parameter('brake_hysteresis', '1', 'flaw', '', floor=0.05, most=0.5, prior=20.0)
 DEAD_TIME = Parameter('brake_dead_time_s', 's', 'flaw', '', floor=1e-3, most=0.05, prior=20.0)
 CURVATURE = Parameter('brake_curvature', '1', 'flaw', '', floor=0.05, least=-0.9, most=0.9, prior=20.0)
 RELEASE = Parameter('brake_release_ratio', '1', 'brake', '', least=0.1, most=10.0, prior=20.0, none=1.0)
 FRICTION_FALL = Parameter('friction_fall_s_m', 's/m', 'contact', '', floor=1e-3, most=0.05, prior=20.0)
-FLAWS = (FADING, HYSTERESIS, DEAD_TIME, CURVATURE, RELEASE, FRICTION_FALL)
+FLAWS = (FADING, COOLING, HYSTERESIS, DEAD_TIME, CURVATURE, RELEASE, FRICTION_FALL)
 WHEELS = ('upper', 'lower')
 
 

@@ -12,6 +12,7 @@ from ..options import options
 from .brake_flaws import act, brake_torques, with_flaws
 from .logs import Log, Motion, motion_of, segments_of
 from .parameters import DELAY, FLAWS, FRICTION_FALL, RATE_LIMIT, RELEASE, Form, Parameter, base_options, disc_of
+from .slots import Slots, slots_of, weighed
 
 #: an even distribution within one count, counts^2
 COUNT_VARIANCE = 1 / 12
@@ -60,7 +61,7 @@ class Piece:
 @dataclass
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
-    keys of the flaws that are fitted."""
+    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -74,6 +75,7 @@ class Problem:
     with_rate_limit: bool = False
     discs: tuple[str, ...] = ()
     flaws: tuple[str, ...] = ()
+    slots: Mapping[str, Slots] = field(default_factory=dict)
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
@@ -83,11 +85,12 @@ class Problem:
         counts_per_rev = int(values['encoder_counts_per_rev'])
         motions = [motion_of(log, counts_per_rev) for log in logs]
         segments = [segments_of(log, motion) for log, motion in zip(logs, motions)]
+        slots = slots_of(logs, motions, counts_per_rev)
         known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
         given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
         keys = {p.key for p in form.parameters} | {RATE_LIMIT.key}
-        return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
-                   counts_per_rev, tuple(drifts), discs=tuple(discs))
+        return cls(form, base, logs, weighed(logs, motions, slots), segments, given, {k: v for k, v in known.items() if k in keys},
+                   counts_per_rev, tuple(drifts), discs=tuple(discs), slots=slots)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

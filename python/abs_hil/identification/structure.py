@@ -15,7 +15,7 @@ import numpy as np
 from ..core import _core
 from .brake_flaws import amounts, brake_torques, fallen, full_Nm, static_torques
 from .linear import _relative, by_windows, keep_normals, left_out_cost, linearise, run_filter, to_rest
-from .parameters import CURVATURE, DEAD_TIME, DELAY, FADING, FRICTION_FALL, HYSTERESIS, RELEASE
+from .parameters import COOLING, CURVATURE, DEAD_TIME, DELAY, FADING, FRICTION_FALL, HYSTERESIS, RELEASE
 from .problem import DISTURBANCES, Disturbances, Fit, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
@@ -31,7 +31,8 @@ class Signals:
     torque_Nm: np.ndarray
     static_Nm: np.ndarray
     full_Nm: float
-    energy_J: np.ndarray
+    heat_J: np.ndarray
+    recovered: np.ndarray
     omega_rad_s: np.ndarray
     angle_rad: np.ndarray
     sliding_m_s: np.ndarray
@@ -53,8 +54,10 @@ class Cause:
 
 
 CAUSES = (
-    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.energy_J, FADING.key,
+    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.heat_J, FADING.key,
           'the brake gets stronger with the energy put in'),
+    Cause('the brake recovers as it cools', 'of its heat per s', 'brake', lambda s: s.recovered, COOLING.key,
+          'the brake gets weaker with the time after the energy'),
     Cause('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', lambda s: fallen(s.static_Nm),
           HYSTERESIS.key, 'the brake holds less after its duty fell than after it rose'),
     Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key, 'the brake acts early'),
@@ -130,9 +133,9 @@ def _signals(fit: Fit) -> list[Signals]:
         torque, static = brake_torques(log, brake), static_torques(log, brake)
         omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
         sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
-        flaws = amounts(log, motion, brake, (FADING.key, DEAD_TIME.key))
-        out.append(Signals(torque, static, full_Nm(brake), -flaws[FADING.key], omega, motion.smooth_rad, sliding,
-                           flaws[DEAD_TIME.key], log.time_s - log.time_s[0]))
+        flaws = amounts(log, motion, brake, (FADING.key, COOLING.key, DEAD_TIME.key))
+        out.append(Signals(torque, static, full_Nm(brake), -flaws[FADING.key], flaws[COOLING.key], omega, motion.smooth_rad,
+                           sliding, flaws[DEAD_TIME.key], log.time_s - log.time_s[0]))
     return out
 
 
@@ -198,8 +201,8 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
 
 
 def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
-    """The fit with one more flaw; None if it is not there after all: of another sign, not sure, or against what logs that are
-    left out say."""
+    """The fit with one more flaw; None if it is not there after all: of another sign, not sure by the likelihood, or against
+    what logs that are left out say."""
     key = found.cause.flaw
     problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
     at = [p.key for p in problem.parameters].index(key)
@@ -210,18 +213,16 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     value = min(value, 0.9 * flaw.most)
     flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
     to_rest(flawed, disturbances, 6, check)
-    sd = float(np.sqrt(flawed.covariance()[at, at]) * flawed.scale[at])
-    if not abs(flawed.values[key] - flaw.none) > SURE * sd:
-        return None
-    return flawed if _against(flawed, disturbances, key) < _against(fit, disturbances) else None
+    with_it, without = _against(flawed, disturbances, key), _against(fit, disturbances)
+    return flawed if with_it[0] < without[0] - SURE**2 and sum(with_it) < sum(without) else None
 
 
-def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> float:
-    """-2 log likelihood of all logs, and of each by what the others tell. The first decides about a flaw that one log alone
-    shows."""
+def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> tuple[float, float]:
+    """-2 log likelihood of all logs, and of each by what the others tell. The first one decides, with the second, about a flaw
+    that one log alone shows."""
     cost, found = run_filter(fit, disturbances)
     keep_normals(fit, found)
-    return cost + left_out_cost(fit, doubted)
+    return cost, left_out_cost(fit, doubted)
 
 
 def sentence(causes: Sequence[Found], fit: Fit) -> str:
