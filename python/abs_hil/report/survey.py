@@ -102,7 +102,7 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         columns['distance_m'] = columns['distance_m'] - (columns['distance_m'][0] if first else 0.0)
         return _core.metrics_of({**columns, 'braking': braking[first:last].astype(np.float64)}, found.r2_m, end_speed_m_s)
     found.metrics = figures_from(0, len(time))
-    brakings = [(int(place), pulse) for start, end in zip(starts, [*starts[1:], len(time)]) if braking[start]
+    brakings = [(int(place), pulse) for start, end in zip(starts.tolist(), [*starts[1:].tolist(), len(time)]) if braking[start]
                 for pulse, place in enumerate([start, *_pulses(rows, start, end)], 1)][:MOST_BRAKINGS]
     if len(brakings) > 1:
         ends = [place for place, _ in brakings[1:]] + [len(time)]
