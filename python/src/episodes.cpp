@@ -14,6 +14,7 @@
 
 #include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/brake_map.hpp"
+#include "array.hpp"
 #include "bindings.hpp"
 #include "run/run.hpp"
 #include "study/parallel.hpp"
@@ -161,7 +162,8 @@ class Episodes {
   }
   /// Shape (rigs, values).
   [[nodiscard]] py::array_t<double> values() {
-    py::array_t<double> all({episodes_.size(), Episode::value_count});
+    auto all = new_array<py::array_t<double>>(
+        {static_cast<py::ssize_t>(episodes_.size()), static_cast<py::ssize_t>(Episode::value_count)});
     for (std::size_t i = 0; i < episodes_.size(); ++i) {
       const auto values = at(i).values();
       std::copy(values.begin(), values.end(), all.mutable_data(static_cast<py::ssize_t>(i), 0));

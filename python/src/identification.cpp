@@ -16,7 +16,7 @@ Array trajectory(const PlantOptions& base, const Values& nominal, const py::dict
   const Inputs inputs(log);
   if (start.size() != states) throw std::invalid_argument("give a start of five values");
   DelayedPlant plant(base, nominal);
-  Array all({inputs.rows(), states});
+  auto all = new_array<Array>({inputs.rows(), states});
   double* const at = all.mutable_data();
   const double* from = start.data();
   const py::gil_scoped_release release;
@@ -36,7 +36,7 @@ Array tyre_forces_N(const PlantOptions& base, const Values& values, const Array&
   if (omega2.size() != omega1.size() || brake_torque.size() != omega1.size()) {
     throw std::invalid_argument("the arrays differ in length");
   }
-  Array forces(omega1.size());
+  auto forces = new_array<Array>({omega1.size()});
   for (std::ptrdiff_t i = 0; i < omega1.size(); ++i) {
     plant.reset({0.0, 0.0, omega1.data()[i], omega2.data()[i], brake_torque.data()[i]});
     forces.mutable_data()[i] = plant.tyre_force_N();
@@ -48,7 +48,7 @@ Array tyre_forces_N(const PlantOptions& base, const Values& values, const Array&
 py::array_t<std::int32_t> encoder_counts(const PlantOptions& base, const Array& angles_rad) {
   if (angles_rad.ndim() != 2 || angles_rad.shape(1) != angles) throw std::invalid_argument("give angles of two wheels");
   const plant_sim::Encoder encoders[] = {plant_sim::upper_encoder(base), plant_sim::lower_encoder(base)};
-  py::array_t<std::int32_t> counts({angles_rad.shape(0), angles});
+  auto counts = new_array<py::array_t<std::int32_t>>({angles_rad.shape(0), angles});
   for (std::ptrdiff_t i = 0; i < counts.size(); ++i)
     counts.mutable_data()[i] = encoders[i % angles].counts(angles_rad.data()[i], 0.0);
   return counts;

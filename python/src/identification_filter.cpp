@@ -17,6 +17,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "array.hpp"
 #include "bindings.hpp"
 
 namespace abs_hil::python {
@@ -289,7 +290,7 @@ py::tuple smooth(const py::dict& d, const Array& by_parameters, const Array& dir
   const Disturbed disturbed(directions, sd, time_constant_s);
   if (by_parameters.size() != p || piece.sums.columns != 1)
     throw std::invalid_argument("give one change of each parameter");
-  Array changes({piece.windows, static_cast<std::ptrdiff_t>(size)});
+  auto changes = new_array<Array>({piece.windows, static_cast<std::ptrdiff_t>(size)});
   double* const to = changes.mutable_data();
   double left = 0.0;
   {
@@ -329,7 +330,7 @@ Array slopes(const py::dict& d, const Array& by_parameters, const Array& directi
   const Disturbed disturbed(directions, sd, time_constant_s);
   if (by_parameters.size() != piece.parameters || piece.sums.columns != 1)
     throw std::invalid_argument("give one change of each parameter");
-  Array all({2, disturbances});
+  auto all = new_array<Array>({2, disturbances});
   double* const by_sd = all.mutable_data();
   double* const by_time = by_sd + disturbances;
   const py::gil_scoped_release release;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/plant.hpp"
+#include "array.hpp"
 #include "bindings.hpp"
 
 /// Plants and inputs of a log, as identification simulates them.

@@ -236,12 +236,12 @@ std::array<double, states> run(DelayedPlant& plant, const Inputs& inputs, const 
 struct Sensitivities {
   Sensitivities(std::ptrdiff_t rows, std::ptrdiff_t windows, std::ptrdiff_t count)
       : parameters(count),
-        angle({rows, angles}),
-        by_state({rows, angles, moving}),
-        by_parameter({rows, angles, count}),
-        end({windows, states}),
-        end_by_state({windows, states, moving}),
-        end_by_parameter({windows, states, count}),
+        angle(new_array<Array>({rows, angles})),
+        by_state(new_array<Array>({rows, angles, moving})),
+        by_parameter(new_array<Array>({rows, angles, count})),
+        end(new_array<Array>({windows, states})),
+        end_by_state(new_array<Array>({windows, states, moving})),
+        end_by_parameter(new_array<Array>({windows, states, count})),
         angle_at(angle.mutable_data()),
         by_state_at(by_state.mutable_data()),
         by_parameter_at(by_parameter.mutable_data()),

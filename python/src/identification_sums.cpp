@@ -26,11 +26,11 @@ py::dict condense(const py::dict& d) {
     throw std::invalid_argument("the arrays of a piece do not fit together");
   }
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Array gram({windows, m, m});
-  Array cross({windows, m, c});
-  Array square({windows, c, c});
-  Array log_weight(windows);
-  Array readings({windows, std::ptrdiff_t{2}});
+  auto gram = new_array<Array>({windows, m, m});
+  auto cross = new_array<Array>({windows, m, c});
+  auto square = new_array<Array>({windows, c, c});
+  auto log_weight = new_array<Array>({windows});
+  auto readings = new_array<Array>({windows, 2});
   double* const gram_at = gram.mutable_data();
   double* const cross_at = cross.mutable_data();
   double* const square_at = square.mutable_data();
