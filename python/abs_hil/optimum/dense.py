@@ -46,13 +46,18 @@ class Certificate:
     driven_m: float
 
 
-class _Field:
-    """Motion of many states at once; u is the commanded torque."""
+class Field:
+    """Motion of many states at once on an even road; u is the commanded torque.
 
-    def __init__(self, plant: PathLike, set: Mapping[str, Value] | None) -> None:
-        self.rig = Rig.of(plant=plant, set=set)
+    friction: a factor of the tyre's force, other than 1 under a constant load alone.
+    """
+
+    def __init__(self, plant: PathLike, set: Mapping[str, Value] | None, friction: float = 1.0) -> None:
+        self.rig, self._friction = Rig.of(plant=plant, set=set), friction
         if self.rig.values['friction_profile']:
             raise ValueError('the dense programme is for even roads; leave plant.friction_profile out')
+        if friction != 1.0 and self.rig.values['load'] != 'constant':
+            raise ValueError(f'plant.load is {self.rig.values["load"]}; a friction other than 1 needs constant')
         self._base = _core.PlantOptions(options(plant=plant, set=set))
         slips = np.linspace(0.0, 0.999, 4000)
         speed = np.full_like(slips, 100.0)
@@ -63,7 +68,7 @@ class _Field:
 
     def _force_N(self, slip: np.ndarray, speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
         upper = np.where(slip >= 1.0, 0.0, (1.0 - slip) * speed * self.rig['r2_m'] / self.rig['r1_m'])
-        return np.asarray(_core.tyre_forces_N(self._base, [], upper, speed, torque))
+        return np.asarray(self._friction * _core.tyre_forces_N(self._base, [], upper, speed, torque))
 
     def rates(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Of slip, speed of the lower wheel, torque and distance."""
@@ -89,16 +94,16 @@ class _Field:
             h = np.clip((to_rad_s - at[1]) / k1[1], -longest_s, longest_s)
             to_stand = np.maximum((1.0 - at[0]) / np.maximum(k1[0], 1e-9), LEAST_STEP_S)
             h = np.where((at[0] < 1.0) & (k1[0] > 0.0), np.minimum(h, to_stand), h)
-            k2 = self.rates(_on_road(at + 0.5 * h * k1), command)
-            k3 = self.rates(_on_road(at + 0.5 * h * k2), command)
-            k4 = self.rates(_on_road(at + h * k3), command)
-            x[:, going] = _on_road(at + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4))
+            k2 = self.rates(on_road(at + 0.5 * h * k1), command)
+            k3 = self.rates(on_road(at + 0.5 * h * k2), command)
+            k4 = self.rates(on_road(at + h * k3), command)
+            x[:, going] = on_road(at + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4))
             going = going[np.abs(x[1, going] - to_rad_s) > REACHED * (from_rad_s - to_rad_s)]
         k1 = self.rates(x, u)
-        return _on_road(x + (to_rad_s - x[1]) / k1[1] * k1)
+        return on_road(x + (to_rad_s - x[1]) / k1[1] * k1)
 
 
-def _on_road(x: np.ndarray) -> np.ndarray:
+def on_road(x: np.ndarray) -> np.ndarray:
     """States whose slip lies between that of a wheel that rolls and that of one that stands."""
     x[0] = np.clip(x[0], 0.0, 1.0)
     return x
@@ -107,7 +112,7 @@ def _on_road(x: np.ndarray) -> np.ndarray:
 def certify(plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = None, *, start_speed_rad_s: float = 170.0,
             end_speed_m_s: float = 0.3, grid: Grid | None = None) -> Certificate:
     """The shortest braking of a plant on its even road, from wheels that roll."""
-    grid, field = grid or Grid(), _Field(plant, set)
+    grid, field = grid or Grid(), Field(plant, set)
     most = field.rig.max_torque_Nm
     roots, torques = np.linspace(0.0, 1.0, grid.slips), np.linspace(0.0, most, grid.torques)
     layers = [end_speed_m_s / field.rig['r2_m']]
