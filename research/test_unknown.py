@@ -1,6 +1,7 @@
 """What not knowing tyre or road costs at least: identical tyres, the spread of counts on the plant, a jump."""
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -8,11 +9,15 @@ import pytest
 
 pytest.importorskip('casadi')
 
+import certificate  # noqa: E402
 import unknown  # noqa: E402
 
 from abs_hil import Plant  # noqa: E402
 from abs_hil.optimum import END_SPEED_M_S, Rig, drivers, optimum  # noqa: E402
+from abs_hil.optimum.dense import Grid, certify  # noqa: E402
 from abs_hil.optimum.road import Piece  # noqa: E402
+
+SMALL = certificate.Grid(slips=40, torques=20, layer_s=4e-3)
 
 
 def tyre(theta_N: float, B: float, C: float) -> Rig:
@@ -63,3 +68,68 @@ def test_a_jump_that_nobody_foresees_costs_less_than_the_causal_driver_loses():
     causal = [drivers.causal(rig, start, road, END_SPEED_M_S).distance_m for road in roads]
     assert 0.0 < found.loss <= found.primal + 1e-9
     assert found.loss < np.mean(np.array(causal) / np.array(found.known_m)) - 1.0
+
+
+def tyres() -> list[unknown.Member]:
+    """Two with rather flat curves, from 40 rad/s, whose commands agree for 60 ms."""
+    rigs = [tyre(30.0, 14.0, 1.3), tyre(42.0, 10.0, 1.3)]
+    return unknown.of_tyres(rigs, rolling(rigs[0], 40.0), 60, END_SPEED_M_S)
+
+
+def test_the_programme_meets_that_of_even_roads_and_the_collocation_of_priced_brakings():
+    members = tyres()
+    found = unknown.ignorance(members)
+    made, = certificate.certify([(members, found)], SMALL)
+    even = certify('paper-table1', {f'plant.{name}': members[1].rig[name] for name in ('theta_N', 'B', 'C')},
+                   start_speed_rad_s=40.0, grid=Grid(slips=30, torques=12, layer_share=0.1))
+    assert made.known_m[1] == pytest.approx(even.value_m, rel=1e-3)
+    assert made.known_m == pytest.approx(found.known_m, rel=1e-3)
+    assert made.priced_m == pytest.approx(found.priced_m, rel=1e-3)
+    assert np.abs(np.array(found.priced_m) / found.known_m - 1.0).min() > 0.01  # so the prices count
+    assert found.loss > 1e-3 and made.loss == pytest.approx(found.loss, abs=1e-4)
+
+
+def test_the_programme_tells_a_priced_braking_that_is_not_the_shortest(monkeypatch):
+    members, least = tyres(), unknown._Problem.least
+
+    def longer(self, first, known_m, prices=None):  # a local optimum, 1 % longer
+        value, *rest = least(self, first, known_m, prices)
+        return (value if prices is None else value + 0.01 * unknown.COST / len(members)), *rest
+    monkeypatch.setattr(unknown._Problem, 'least', longer)
+    monkeypatch.setattr(unknown, 'min', max, raising=False)  # the sum that the brakings found do not bound
+    found = unknown.ignorance(members)
+    made, = certificate.certify([(members, found)], SMALL)
+    assert made.loss < found.loss - 0.008
+
+
+def test_any_prices_that_cancel_give_a_bound_and_others_are_refused():
+    members = tyres()
+    found = unknown.ignorance(members)
+    twice = dataclasses.replace(found, prices=[2.0 * one for one in found.prices])
+    made, = certificate.certify([(members, twice)], SMALL)
+    assert made.loss < 0.5 * found.loss
+    with pytest.raises(ValueError, match='do not cancel'):
+        certificate.certify([(members, dataclasses.replace(found, prices=[found.prices[0], 1.1 * found.prices[1]]))], SMALL)
+    tracks = [certificate.Track.of(member, prices) for member, prices in zip(members, found.prices)]
+    sums = sum(track.costs / known_m for track, known_m in zip(tracks, found.known_m))
+    assert np.abs(sums).max() < 1e-6 * np.abs(tracks[0].costs).max()
+
+
+def test_patches_that_nobody_foresees_agree_in_distance():
+    rig = Rig.of(plant='paper-timing', set={'plant.B': 10.0, 'plant.C': 1.4})
+    roads = [[Piece(1.0, end=at, along='distance'), Piece(0.5, begin=at, end=at + 0.3, along='distance'),
+              Piece(1.0, begin=at + 0.3, along='distance')] for at in (0.2, 0.4)]
+    members = unknown.of_roads(rig, rolling(rig, 60.0), roads, END_SPEED_M_S)
+    assert [sum(part.lengths.sum() for part in member.parts if part.key) for member in members] == pytest.approx([0.2, 0.4])
+    found = unknown.ignorance(members)
+    made, = certificate.certify([(members, found)], dataclasses.replace(SMALL, layer_m=0.02, speed_share=0.05))
+    assert found.loss > 0.0 and made.loss == pytest.approx(found.loss, abs=1e-4)
+    assert made.known_m == pytest.approx(found.known_m, rel=1e-3)
+
+
+def test_a_change_in_time_is_known_from_the_next_period_on():
+    rig = Rig.of(plant='paper-timing')
+    for at, until in ((0.1, 0.101), (0.1004, 0.101)):
+        road = [Piece(1.0, end=at), Piece(0.5, begin=at)]
+        member, = unknown.of_roads(rig, rolling(rig, 170.0), [road], END_SPEED_M_S)
+        assert sum(part.lengths.sum() for part in member.parts if part.key) == pytest.approx(until)

@@ -13,18 +13,19 @@ Proof. Let all members have the same dithers. While the counts agree, so do the 
 probability D(k) at most, as its dithers are independent of all before. Say that the commands agree for N periods: then the mean
 of L_i is at least m(N), even if the controller learns the truth thereafter. P(N >= n) >= S(n), m rises with n, and summing by
 parts gives the theorem. Roads that are equal up to their changes need no dithers: nothing that moves before a change can tell
-it, so that the commands agree until the first period after it.
+it, so that the commands agree until the first period that begins after it. When a change in distance meets the periods depends
+on the braking, so there they agree up to the change; until then equal commands in time are equal commands in distance.
 
 m(n) is computed by collocation of all members at once. That finds local optima, so the value used is that of the dual: the
 prices of the agreement are added to each member's cost, and each is solved alone. By weak duality their sum lies below m(n),
-if these single optima are right, as for the bounds of abs_hil.optimum.trajectory. It is computed, not certified. The load is
-constant, and no wheel stands.
+if these single optima are right, as for the bounds of abs_hil.optimum.trajectory: research/certificate.py computes them anew.
+The load is constant, and no wheel stands.
 """
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -54,13 +55,19 @@ class Part:
     """Intervals of a braking on one friction.
 
     key:    parts with the same key have the same commands in all members. free: the solver chooses the duration; until_m: the
-    distance at which it then ends.
+    distance at which it then ends. lengths_m: of intervals that are fixed in distance, the durations then being guesses.
     """
     lengths_s: np.ndarray
     friction: float
     key: str = ''
     free: bool = False
     until_m: float | None = None
+    lengths_m: np.ndarray | None = None
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """s, or m if they are fixed in distance."""
+        return self.lengths_s if self.lengths_m is None else self.lengths_m
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,8 @@ class _Braking:
                 for j, slopes in enumerate(SLOPES):
                     state = points[j + 1] * ca.DM(SCALE)
                     rate = rates(state, rig.torque_rate_Nm_s(state, command), part.friction)
-                    zeros.append(ca.horzcat(*points) @ ca.DM(slopes) - float(length_s) * share * rate / ca.DM(SCALE))
+                    lasts_s = float(part.lengths[number]) * (share if part.lengths_m is None else 1.0 / rate[DISTANCE])
+                    zeros.append(ca.horzcat(*points) @ ca.DM(slopes) - lasts_s * rate / ca.DM(SCALE))
                 roughness += 0.0 if before is None else (command - before) ** 2
                 x, before, now_s = points[-1], command, now_s + length_s
             if part.until_m is not None:
@@ -176,10 +184,16 @@ class _Problem:
 
 @dataclass(frozen=True)
 class Ignorance:
-    """known_m: of the optimum that knows the member. loss: m(n), of the dual. primal: of the brakings found, which lies above."""
+    """known_m: of the optimum that knows the member. loss: m(n), of the dual. primal: of the brakings found, which lies above.
+
+    prices: of the shared commands of each member in the order of its parts, in m per N m; those of a command, each over the
+    known_m of its member, cancel. priced_m: the least sum of distance and priced commands of each member.
+    """
     known_m: list[float]
     loss: float
     primal: float
+    prices: list[np.ndarray]
+    priced_m: list[float]
 
 
 def ignorance(members: Sequence[Member]) -> Ignorance:
@@ -225,20 +239,24 @@ def ignorance(members: Sequence[Member]) -> Ignorance:
     for braking, place, price in zip(brakings, places, prices):
         mine = np.array([index for _, index in braking.shared], dtype=int)
         price[mine] -= (total / np.maximum(sharing, 1.0))[place[mine]]
-    dual = 0.0
+    duals = []
     together = [w[place] for place in places]
     for problem, share, price, *firsts in zip(problems, shares, prices, together, alone):
-        dual += min(problem.least(first, np.array([share]), price)[0] for first in firsts)
-    return Ignorance([float(one) for one in known_m], min(dual, value) / COST - 1.0, value / COST - 1.0)
+        duals.append(min(problem.least(first, np.array([share]), price)[0] for first in firsts))
+    shared = [price[[index for _, index in braking.shared]] for braking, price in zip(brakings, prices)]
+    return Ignorance([float(one) for one in known_m], min(sum(duals), value) / COST - 1.0, value / COST - 1.0,
+                     [price * share / COST for price, share in zip(shared, shares)],
+                     [float(dual * share / COST) for dual, share in zip(duals, shares)])
 
 
-def _guess(rig: Rig, start: np.ndarray, road: Sequence[Piece], end_speed_m_s: float) -> list[float]:
-    """The durations of a road's pieces in a plain braking, which may stop before the last ones."""
+def _guess(rig: Rig, start: np.ndarray, road: Sequence[Piece], end_speed_m_s: float) -> list[np.ndarray]:
+    """Times and distances on each of a road's pieces, shape (2, points), in a plain braking, which may stop before the end."""
     for count in range(len(road), 0, -1):
         passed = [*road[:count - 1], dataclasses.replace(road[count - 1], end=math.inf)]
         phases = Guesser(rig).phases(Policy(GUESSES[0]), start, 0.0, passed, end_speed_m_s)
         if phases:
-            return [sum(phase.duration_s for phase in phases if phase.piece is piece) for piece in passed]
+            return [np.concatenate([(phase.time_s, np.array(phase.states)[:, DISTANCE]) for phase in phases
+                                    if phase.piece is piece], axis=1) for piece in passed]
     raise NoOptimum('no first guess gets to the end of the road')
 
 
@@ -248,29 +266,43 @@ def _intervals(duration_s: float) -> np.ndarray:
 
 def of_tyres(rigs: Sequence[Rig], start: np.ndarray, periods: int, end_speed_m_s: float) -> list[Member]:
     """A family of tyres on an even road, whose commands agree for some periods."""
-    common = Part(np.full(periods, PERIOD_S), 1.0, 'start')
-    return [Member(rig, start, [EVEN], [common, Part(_intervals(
-        _guess(rig, start, [EVEN], end_speed_m_s)[0] - periods * PERIOD_S), 1.0, free=True)], end_speed_m_s) for rig in rigs]
+    common, members = Part(np.full(periods, PERIOD_S), 1.0, 'start'), []
+    for rig in rigs:
+        stop_s = _guess(rig, start, [EVEN], end_speed_m_s)[0][0, -1]
+        members.append(Member(rig, start, [EVEN], [common, Part(_intervals(stop_s - periods * PERIOD_S), 1.0, free=True)],
+                              end_speed_m_s))
+    return members
 
 
 def of_roads(rig: Rig, start: np.ndarray, roads: Sequence[Sequence[Piece]], end_speed_m_s: float) -> list[Member]:
     """A family of roads that differ by the place of their first change, in its order. The commands agree until the first
-    period after it."""
+    period that begins after a change in time; nobody knows when a change in distance meets the periods, so there it is the change.
+    """
     spine: list[Part] = []
     before_s, members = 0.0, []
     for number, road in enumerate(roads):
-        durations = _guess(rig, start, road, end_speed_m_s)
-        first, distance = road[0], road[0].along == 'distance'
-        spine.append(Part(_intervals(durations[0] - before_s), first.value, f'{number}', distance,
-                          first.end if distance else None))
-        own = [Part(np.array([PERIOD_S]), road[1].value, f'{number} period')]
-        durations[1] -= PERIOD_S
-        for piece, duration_s, last in zip(road[1:], durations[1:], [False] * (len(durations) - 2) + [True]):
+        guess, first = _guess(rig, start, road, end_speed_m_s), road[0]
+        (times, distances), distance = guess[0], road[0].along == 'distance'
+        if distance:
+            before_s = float(np.interp(roads[number - 1][0].end, distances, times)) if number else 0.0
+        lengths_s, own, waited_s = _intervals(times[-1] - before_s), [], 0.0
+        ends = np.interp(before_s + np.cumsum([0.0, *lengths_s]), times, distances)
+        ends[-1] = first.end
+        if number:
+            ends[0] = roads[number - 1][0].end
+        spine.append(Part(lengths_s, first.value, f'{number}', lengths_m=np.diff(ends) if distance else None))
+        if not distance:
+            waited_s = (math.floor(first.end / PERIOD_S + 1e-6) + 1) * PERIOD_S - first.end
+            own.append(Part(np.array([waited_s]), road[1].value, f'{number} period'))
+        durations_s = [times[-1] - times[0] for times, _ in guess]
+        durations_s[1] -= waited_s
+        for piece, duration_s, last in zip(road[1:], durations_s[1:], [False] * (len(guess) - 2) + [True]):
             own.append(Part(_intervals(duration_s), piece.value, '', distance or last,
                             piece.end if distance and not last else None))
-        members.append(Member(rig, start, road[:len(durations)], [*spine, *own], end_speed_m_s))
-        spine.append(Part(np.array([PERIOD_S]), first.value, f'{number} period'))
-        before_s = durations[0] + PERIOD_S
+        members.append(Member(rig, start, road[:len(guess)], [*spine, *own], end_speed_m_s))
+        if not distance:
+            spine.append(Part(np.array([waited_s]), first.value, f'{number} period'))
+        before_s = first.end + waited_s
     return members
 
 
@@ -300,14 +332,18 @@ def spread_counts(rigs: Sequence[Rig], start: np.ndarray, periods: int) -> np.nd
     return np.asarray(np.where(reached <= rises_to, counts, np.inf)[::each][:periods])
 
 
-def tyre_bound(rigs: Sequence[Rig], start: np.ndarray, end_speed_m_s: float) -> Ignorance:
-    """The theorem's bound for two tyres that are equally likely; both start with the same slip."""
+def of_tyres_parting(rigs: Sequence[Rig], start: np.ndarray, end_speed_m_s: float) -> list[tuple[float, list[Member]]]:
+    """S(n_j) and the family of two tyres that agree for n_j periods; both start with the same slip."""
     apart = spread_counts(rigs, start, 100)
     agree = np.maximum(0.0, 1.0 - np.concatenate([[0.0], np.cumsum(apart)[:-1]]))  # S(n)
-    bound, before = 0.0, 0.0
-    for least in AGREE:
-        periods = int(np.sum(agree >= least)) - 1
-        found = ignorance(of_tyres(rigs, start, periods, end_speed_m_s))
-        bound += max(found.loss - before, 0.0) * float(agree[periods])
-        before = max(found.loss, before)
-    return Ignorance(found.known_m, bound, found.primal)
+    periods = [int(np.sum(agree >= least)) - 1 for least in AGREE]
+    return [(float(agree[count]), of_tyres(rigs, start, count, end_speed_m_s)) for count in periods]
+
+
+def bound(losses: Iterable[tuple[float, float]]) -> float:
+    """Of the theorem, from S(n_j) and lower bounds of m(n_j)."""
+    whole, before = 0.0, 0.0
+    for agree, loss in losses:
+        whole += max(loss - before, 0.0) * agree
+        before = max(loss, before)
+    return whole
