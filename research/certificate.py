@@ -17,8 +17,7 @@ the end of the agreement, where V is what the known rest of the road takes:
 
 The problem is linear in u, so the ends of its range and switching between them are enough. On the even road to the end V is the
 limit of such layers without prices. The loss is the mean of (V with prices - V without) / known_m on one grid, so that what is
-common to both errors cancels. A coarse grid blurs T, as noise would, which gives a priced braking more chances: where it matters
-(benchmark.md's families) the loss rises with the grid.
+common to both errors cancels. What does not cancel - a coarse grid blurs T, as noise would - shows on two grids.
 """
 from __future__ import annotations
 

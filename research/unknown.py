@@ -279,30 +279,27 @@ def of_roads(rig: Rig, start: np.ndarray, roads: Sequence[Sequence[Piece]], end_
     period that begins after a change in time; nobody knows when a change in distance meets the periods, so there it is the change.
     """
     spine: list[Part] = []
-    before_s, members = 0.0, []
+    before, members = 0.0, []  # the place up to which there are parts
     for number, road in enumerate(roads):
         guess, first = _guess(rig, start, road, end_speed_m_s), road[0]
-        (times, distances), distance = guess[0], road[0].along == 'distance'
-        if distance:
-            before_s = float(np.interp(roads[number - 1][0].end, distances, times)) if number else 0.0
-        lengths_s, own, waited_s = _intervals(times[-1] - before_s), [], 0.0
-        ends = np.interp(before_s + np.cumsum([0.0, *lengths_s]), times, distances)
-        ends[-1] = first.end
-        if number:
-            ends[0] = roads[number - 1][0].end
-        spine.append(Part(lengths_s, first.value, f'{number}', lengths_m=np.diff(ends) if distance else None))
-        if not distance:
+        (times, distances), in_m, waited_s = guess[0], first.along == 'distance', 0.0
+        own: list[Part] = []
+        begin_s = float(np.interp(before, distances, times)) if in_m else before
+        lengths_s = _intervals(times[-1] - begin_s)
+        places_m = np.interp(begin_s + np.cumsum([0.0, *lengths_s]), times, distances)
+        places_m[[0, -1]] = before, first.end
+        spine.append(Part(lengths_s, first.value, f'{number}', lengths_m=np.diff(places_m) if in_m else None))
+        if not in_m:
             waited_s = (math.floor(first.end / PERIOD_S + 1e-6) + 1) * PERIOD_S - first.end
             own.append(Part(np.array([waited_s]), road[1].value, f'{number} period'))
         durations_s = [times[-1] - times[0] for times, _ in guess]
         durations_s[1] -= waited_s
         for piece, duration_s, last in zip(road[1:], durations_s[1:], [False] * (len(guess) - 2) + [True]):
-            own.append(Part(_intervals(duration_s), piece.value, '', distance or last,
-                            piece.end if distance and not last else None))
+            own.append(Part(_intervals(duration_s), piece.value, '', in_m or last, piece.end if in_m and not last else None))
         members.append(Member(rig, start, road[:len(guess)], [*spine, *own], end_speed_m_s))
-        if not distance:
+        if not in_m:
             spine.append(Part(np.array([waited_s]), first.value, f'{number} period'))
-        before_s = first.end + waited_s
+        before = first.end + waited_s
     return members
 
 

@@ -30,10 +30,10 @@ PLACES = 6
 HEAD = ['group', 'family', 'members', 'optimum that knows m', 'not knowing costs at least %', 'by collocation %',
         'by the programme on a coarse grid %', 'by the programme %', f'{LAW} %']
 #: coarse and fine grids of the families that are certified
-GRIDS = {('even road, farthest tyres', '60 rad/s'): (Grid(slips=90, torques=36, speed_share=0.1),
-                                                      Grid(slips=140, torques=48, speed_share=0.1)),
+GRIDS = {('even road, farthest tyres', '60 rad/s'): (Grid(slips=80, torques=30, speed_share=0.1),
+                                                      Grid(slips=120, torques=45, speed_share=0.1)),
          ('jump, drawn rigs', '16'): (Grid(), Grid(torques=40)),
-         ('jump, `paper-timing`', '170 rad/s'): (Grid(slips=40, torques=20), Grid(speed_share=0.1)),
+         ('jump, `paper-timing`', '170 rad/s'): (Grid(slips=40, torques=16, speed_share=0.1), Grid(speed_share=0.1)),
          ('patch, `paper-timing`', '170 rad/s'): (Grid(slips=36, torques=16, layer_m=0.04),
                                                   Grid(slips=48, torques=20, layer_m=0.03, speed_share=0.06))}
 
