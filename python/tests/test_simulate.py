@@ -273,3 +273,22 @@ def test_lists():
     assert set(abs_hil.experiments()) >= {'paper', 'coast-down', 'brake-step', 'friction-jump'}
     key = abs_hil.keys(set={'plant.theta_N': 31})['plant.theta_N']
     assert key['value'] == 31 and key['unit'] == 'N'
+
+
+def test_a_drawn_rig_is_the_same_for_a_seed_and_the_program_runs_on_it(tmp_path, abs_hil_program):
+    files = {kind: tmp_path / f'{kind}.toml' for kind in ('steady', 'wandering')}
+    for kind, file in files.items():
+        assert f'--plant {file}' in abs_hil_program('rig', kind, '7', '--out', file).stdout
+    from abs_hil.rig import unknown_rig
+    assert [file.read_text() for file in files.values()] == [unknown_rig(7, False), unknown_rig(7, True)]
+    assert unknown_rig(8, False) != unknown_rig(7, False)
+    known = abs_hil.keys()
+    for kind, file in files.items():
+        drawn = abs_hil.keys(plant=file)
+        assert all(drawn[f'plant.{key}']['value'] == known[f'plant.{key}']['value'] for key in ('J2_kg_m2', 'r2_m'))
+        assert 0.6 * 23.0 <= drawn['plant.theta_N']['value'] <= 1.4 * 23.0
+        assert ('from' in drawn['plant.friction_profile']['value']) == (kind == 'wandering')
+        assert (drawn['plant.upper_encoder_eccentricity_rad']['value'] > 0.0) == (kind == 'wandering')
+        assert abs_hil.simulate(plant=file, model='paper-table1').summary['stop_distance_m'] > 1.0
+    refused = abs_hil_program('rig', 'steady', '7', '--out', files['steady'], status=2).stderr
+    assert 'exists; give another --out, or --force' in refused

@@ -41,6 +41,7 @@ constexpr std::array table{
     Subcommand{"tune", "search for a controller's gains in simulation"},
     Subcommand{"identify", "estimate the rig's parameters from its own logs, with intervals"},
     Subcommand{"benchmark", "score controllers against the shortest braking, over a fixed set of cases"},
+    Subcommand{"rig", "write a simulated rig that a class does not know, steady or wandering"},
     Subcommand{"learn", "train a small controller in simulation, from nothing but trial and error"},
 };
 

@@ -1,0 +1,64 @@
+"""abs_hil rig: a simulated rig that a class does not know (docs/class.md).
+
+The plant paper-table1 with a tyre, wheels, brake, bearings and motor of its own, drawn from a seed. A wandering one's grip,
+brake, motor and bearings also change a little all the time, and both encoder discs sit off their centres. J2 and r2 stay those
+of Table 1, as if somebody had measured them.
+"""
+import argparse
+import pathlib
+import random
+import sys
+from collections.abc import Sequence
+
+from .files import refuse_existing, write_text
+
+#: key: (value of paper-table1, largest relative change)
+DRAWN = {'theta_N': (23.0, 0.4), 'B': (28.0, 0.15), 'C': (1.68, 0.05), 'J1_kg_m2': (7.54e-3, 0.1), 'r1_m': (0.0995, 0.005),
+         'd1_Nms_rad': (118.74e-6, 0.2), 'd2_Nms_rad': (214.68e-6, 0.2), 'M10_Nm': (0.0032, 0.2), 'M20_Nm': (0.0925, 0.2),
+         'b1_Nm': (15.24, 0.1), 'u0': (0.415, 0.05), 'c31_per_s': (20.37, 0.2),
+         'motor_stall_torque_Nm': (2.1122, 0.05), 'motor_no_load_speed_rad_s': (220.0, 0.02)}
+#: standard deviation of the factors, as research/identification_study.py --disturbed has them
+WANDERS = {'friction': 0.01, 'brake_torque': 0.01, 'motor_torque': 0.005, 'upper_bearing': 0.05, 'lower_bearing': 0.05}
+STEP_S, LAST_S = 0.2, 60.0
+ECCENTRICITY_RAD = 0.004
+
+
+def _wandering(sd: float, chance: random.Random) -> str:
+    """A profile: straight lines between values every STEP_S."""
+    values = [1 + chance.gauss(0, sd) for _ in range(int(LAST_S / STEP_S) + 1)]
+    pieces = [f'{values[0]:.5f}'] + [f'{value:.5f} from {k * STEP_S:.1f} to {(k + 1) * STEP_S:.1f}'
+                                     for k, value in enumerate(values[1:])]
+    return 'time: ' + '; '.join(pieces)
+
+
+def unknown_rig(seed: int, wanders: bool) -> str:
+    """The text of its plant's file, which is the same for a seed on every computer."""
+    chance = random.Random(seed)
+    values = {key: value * (1 + spread * chance.uniform(-1, 1)) for key, (value, spread) in DRAWN.items()}
+    values['b2_Nm'] = 0.1 - values['b1_Nm'] * values['u0']  # the map begins at u0 with a small torque
+    lines = [f'description = "unknown rig {seed}"', '', '[plant]']
+    lines += [f'{key} = {value:.6g}' for key, value in values.items()]
+    if wanders:
+        for wheel in ('upper', 'lower'):
+            lines += [f'{wheel}_encoder_eccentricity_rad = {ECCENTRICITY_RAD * chance.uniform(0.5, 1):.6g}',
+                      f'{wheel}_encoder_phase_rad = {chance.uniform(-3, 3):.6g}']
+        lines += [f'{part}_profile = "{_wandering(sd, chance)}"' for part, sd in WANDERS.items()]
+    return '\n'.join(lines) + '\n'
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser('abs_hil rig', allow_abbrev=False, description='Writes a simulated rig that a class does not '
+                                     'know, as a file for --plant (docs/class.md)')
+    parser.add_argument('kind', choices=('steady', 'wandering'), help='whether it changes a little all the time')
+    parser.add_argument('seed', metavar='SEED', type=int, help='which one; the same number is the same rig')
+    parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('rig.toml'), help='[rig.toml]')
+    parser.add_argument('--force', action='store_true', help='replace an existing file')
+    o = parser.parse_args(arguments)
+    try:
+        refuse_existing(o.out, '--out', o.force)
+        write_text(o.out, unknown_rig(o.seed, o.kind == 'wandering'))
+    except ValueError as error:
+        print(f'abs_hil rig: {error}', file=sys.stderr)
+        return 2
+    print(f'{o.out}: use it with --plant {o.out}; its parameters are the answer, so do not read it')
+    return 0
