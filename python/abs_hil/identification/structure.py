@@ -57,7 +57,7 @@ CAUSES = (
     Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.heat_J, FADING.key,
           'the brake gets stronger with the energy put in'),
     Cause('the brake recovers as it cools', 'of its heat per s', 'brake', lambda s: s.recovered, COOLING.key,
-          'the brake gets weaker with the time after the energy'),
+          'the brake fades more the longer it stays hot'),
     Cause('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', lambda s: fallen(s.static_Nm),
           HYSTERESIS.key, 'the brake holds less after its duty fell than after it rose'),
     Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key, 'the brake acts early'),
