@@ -275,9 +275,8 @@ def of_tyres(rigs: Sequence[Rig], start: np.ndarray, periods: int, end_speed_m_s
 
 
 def of_roads(rig: Rig, start: np.ndarray, roads: Sequence[Sequence[Piece]], end_speed_m_s: float) -> list[Member]:
-    """A family of roads that differ by the place of their first change, in its order. The commands agree until the first
-    period that begins after a change in time; nobody knows when a change in distance meets the periods, so there it is the change.
-    """
+    """A family of roads that differ by the place of their first change, in its order. The commands agree up to the change if it is
+    at a distance: its time within a control period is unknown. They agree up to the next control period if it is at a time."""
     spine: list[Part] = []
     before, members = 0.0, []  # the place up to which there are parts
     for number, road in enumerate(roads):

@@ -11,12 +11,13 @@ import sys
 from collections.abc import Sequence
 
 from .files import refuse_existing, write_text
+from .simulation import keys
 
-#: key: (value of paper-table1, largest relative change)
-DRAWN = {'theta_N': (23.0, 0.4), 'B': (28.0, 0.15), 'C': (1.68, 0.05), 'J1_kg_m2': (7.54e-3, 0.1), 'r1_m': (0.0995, 0.005),
-         'd1_Nms_rad': (118.74e-6, 0.2), 'd2_Nms_rad': (214.68e-6, 0.2), 'M10_Nm': (0.0032, 0.2), 'M20_Nm': (0.0925, 0.2),
-         'b1_Nm': (15.24, 0.1), 'u0': (0.415, 0.05), 'c31_per_s': (20.37, 0.2),
-         'motor_stall_torque_Nm': (2.1122, 0.05), 'motor_no_load_speed_rad_s': (220.0, 0.02)}
+#: key: largest change, over the value of START
+START = 'paper-table1'
+SPREADS = {'theta_N': 0.4, 'B': 0.15, 'C': 0.05, 'J1_kg_m2': 0.1, 'r1_m': 0.005, 'd1_Nms_rad': 0.2, 'd2_Nms_rad': 0.2,
+           'M10_Nm': 0.2, 'M20_Nm': 0.2, 'b1_Nm': 0.1, 'u0': 0.05, 'c31_per_s': 0.2, 'motor_stall_torque_Nm': 0.05,
+           'motor_no_load_speed_rad_s': 0.02}
 #: standard deviation of the factors, as research/identification_study.py --disturbed has them
 WANDERS = {'friction': 0.01, 'brake_torque': 0.01, 'motor_torque': 0.005, 'upper_bearing': 0.05, 'lower_bearing': 0.05}
 STEP_S, LAST_S = 0.2, 60.0
@@ -34,7 +35,8 @@ def _wandering(sd: float, chance: random.Random) -> str:
 def unknown_rig(seed: int, wanders: bool) -> str:
     """The text of its plant's file, which is the same for a seed on every computer."""
     chance = random.Random(seed)
-    values = {key: value * (1 + spread * chance.uniform(-1, 1)) for key, (value, spread) in DRAWN.items()}
+    start = keys(plant=START)
+    values = {key: start[f'plant.{key}']['value'] * (1 + spread * chance.uniform(-1, 1)) for key, spread in SPREADS.items()}
     values['b2_Nm'] = 0.1 - values['b1_Nm'] * values['u0']  # the map begins at u0 with a small torque
     lines = [f'description = "unknown rig {seed}"', '', '[plant]']
     lines += [f'{key} = {value:.6g}' for key, value in values.items()]
