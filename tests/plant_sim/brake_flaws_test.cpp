@@ -38,6 +38,16 @@ PlantOptions endless_wheel() {
   return options;
 }
 
+/// A free wheel that nothing but its brake slows down, with a lag of 1 ms.
+PlantOptions fading_alone(double J1_kg_m2, double fading_per_J) {
+  PlantOptions options = wheels_apart();
+  options.rig.wheels.J1_kg_m2 = J1_kg_m2;
+  options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
+  options.rig.brake.c31_per_s = 1000.0;
+  options.brake_flaws.fading_per_J = fading_per_J;
+  return options;
+}
+
 }  // namespace
 
 TEST_CASE("Under a limit of its rate the brake torque ramps, then follows the lag; on a standing wheel too") {
@@ -147,11 +157,7 @@ TEST_CASE("The hysteresis of a cable encloses the area of its closed form") {
 TEST_CASE("A brake fades by the energy that it has taken from its wheel") {
   // T = T0 exp(-k E); without other friction the wheel has lost E = J1 (w0^2 - w^2)/2.
   constexpr double k = 4e-4;
-  PlantOptions options = wheels_apart();
-  options.rig.wheels.J1_kg_m2 = 0.2;
-  options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
-  options.rig.brake.c31_per_s = 1000.0;
-  options.brake_flaws.fading_per_J = k;
+  PlantOptions options = fading_alone(0.2, k);
   const double tick_s = GENERATE(1e-3, 0.4);
   Plant plant(options);
   plant.reset(rolling_at_170);
@@ -173,11 +179,7 @@ TEST_CASE("A brake that cools keeps less of the heat by which it fades") {
   // for t1 leaves E = P (1 - exp(-q t1)) / q; after a rest t2 the share exp(-q t2) of it is left.
   constexpr double q = 0.8;
   constexpr double k = 1e-14;
-  PlantOptions options = wheels_apart();
-  options.rig.wheels.J1_kg_m2 = 1.0;
-  options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
-  options.rig.brake.c31_per_s = 1000.0;
-  options.brake_flaws.fading_per_J = k;
+  PlantOptions options = fading_alone(1.0, k);
   options.brake_flaws.cooling_per_s = q;
   const double tick_s = GENERATE(1e-3, 0.4);
   Plant plant(options);
