@@ -26,10 +26,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from dense import Field
 from layers import Axes, Grid, Layer
 from unknown import Ignorance, Member
 
-from abs_hil.optimum.dense import Field
 from abs_hil.optimum.rig import OMEGA2, SLIP, TORQUE, Rig
 
 #: of the sums of the prices, in parts of their sizes

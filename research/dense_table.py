@@ -11,10 +11,10 @@ import sys
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from dense import Grid, certify  # noqa: E402
 from marked_tables import keep  # noqa: E402
 
 from abs_hil.optimum import Rig, optimum  # noqa: E402
-from abs_hil.optimum.dense import Grid, certify  # noqa: E402
 
 COARSE = Grid(slips=30, torques=12, layer_rad_s=2.0, layer_share=0.1)
 #: plant, changes, start speed in rad/s, grid: a steep curve needs more slips

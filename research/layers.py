@@ -2,7 +2,7 @@
 brake torque T.
 
 Every point of the grid moves under each command u for a length h, by Runge-Kutta steps of the plant's equations and forces in
-C++ (abs_hil.optimum.dense); V(x) = distance(x, u, h) + V_after(x after h) takes V_after between the points by cubics. As the
+C++ (dense.py); V(x) = distance(x, u, h) + V_after(x after h) takes V_after between the points by cubics. As the
 friction is even within a layer, the ends are the same for all layers of a length: the weights are one sparse matrix. In a layer
 of time T moves by itself, T' = c31 (u - T), so that the weights of T are a small matrix of their own.
 """
@@ -12,9 +12,9 @@ import dataclasses
 import math
 
 import numpy as np
+from dense import STEP_SHARE, Field, on_road
 from scipy.sparse import csr_array
 
-from abs_hil.optimum.dense import STEP_SHARE, Field, on_road
 from abs_hil.optimum.rig import Rig
 
 #: part of the points that are dense

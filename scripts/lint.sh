@@ -21,7 +21,7 @@ check_shell() {
 
 check_python() {
   # Joined, because `||` at the call switches off -e within.
-  scripts/setup_python.sh && build/python/bin/ruff check python research/claim research/{test_claim,unknown,certificate,layers,test_unknown,unknown_table,nmpc,nmpc_table,test_nmpc,reproduce,steps,test_reproduce,quoted,drawn_table}.py && build/python/bin/python -m mypy
+  scripts/setup_python.sh && build/python/bin/ruff check python research/claim research/{test_claim,unknown,certificate,layers,dense,test_dense,test_unknown,unknown_table,nmpc,nmpc_table,test_nmpc,reproduce,steps,test_reproduce,quoted,drawn_table}.py && build/python/bin/python -m mypy
 }
 
 check_cppcheck() {

@@ -1,6 +1,6 @@
 """A certificate for even roads: the shortest braking by a dynamic programme over slip, speed and brake torque.
 
-It shares with the collocation of trajectory.py neither the method nor the tyre: every force is one of the plant in C++, the
+It shares with the collocation of abs_hil.optimum neither the method nor the tyre: every force is one of the plant in C++, the
 standing wheel's too. It compares all commands at each point of a grid, so that it has no local optima.
 """
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from ..core import _core
-from ..options import PathLike, Value, options
-from .rig import Rig
+from abs_hil.core import _core
+from abs_hil.optimum.rig import Rig
+from abs_hil.options import PathLike, Value, options
 
 #: steps of the integration: parts of the time constant of the slip
 STEP_SHARE = 0.7
