@@ -1,11 +1,10 @@
-"""Eccentricity from the counts of coasting wheels: offline into the model, and within a run before braking."""
+"""Eccentric encoder discs: in the model, and learnt within a run before braking."""
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
 import abs_hil
-from abs_hil import eccentricity
 
 FLAWS = {'plant.upper_encoder_eccentricity_rad': 0.01, 'plant.upper_encoder_phase_rad': 1.0,
          'plant.lower_encoder_eccentricity_rad': 0.006, 'plant.lower_encoder_phase_rad': -2.0}
@@ -24,31 +23,6 @@ def speed_error(run, wheel):
     rows = rows[:len(rows) // 4]
     true = run.columns[f'omega{wheel}_rad_s'][rows]
     return float(np.abs(run.columns[f'omega{wheel}_est_rad_s'][rows] / true - 1.0).max())
-
-
-def test_fit_finds_what_the_encoder_has(tmp_path):
-    run = braking(**UNKNOWN)
-    found = eccentricity.of_run(run)
-    for wheel, e, phase in (('upper', 0.01, 1.0), ('lower', 0.006, -2.0)):
-        disc = found[wheel]
-        assert disc.sd_rad < 1e-4
-        assert disc.eccentricity_rad == pytest.approx(e, abs=5 * disc.sd_rad)
-        assert disc.phase_rad == pytest.approx(phase, abs=5 * disc.sd_rad / e)
-    assert eccentricity.of_run(braking(**{key: 0.0 for key in FLAWS}))['upper'].eccentricity_rad < 2e-4
-
-
-def test_program_writes_keys_that_the_program_reads(tmp_path, capsys):
-    run = tmp_path / 'run.csv'
-    given = braking(**NOT_LEARNT)
-    given.data.to_csv(run, index=False, na_rep='NaN')
-    out = tmp_path / 'model.toml'
-    assert eccentricity.main([str(run), '--out', str(out)]) == 0
-    keys = abs_hil.keys(config=out)
-    assert keys['model.upper_encoder_eccentricity_rad']['value'] == pytest.approx(0.01, abs=1e-4)
-    corrected = abs_hil.simulate('adaptive-peak', experiment='coast-and-brake', set=FLAWS, config=out)
-    assert speed_error(corrected, 1) < 0.4 * speed_error(given, 1)
-    assert eccentricity.main([str(tmp_path / 'none.csv')]) == 2
-    assert 'none.csv' in capsys.readouterr().err
 
 
 def test_learning_while_coasting_does_as_well_as_knowing():
@@ -95,8 +69,3 @@ def test_learning_leaves_sound_discs_alone_and_says_what_it_found():
         np.testing.assert_array_equal(sound[name], off[name])
     found = abs_hil.simulate('adaptive', set={**FLAWS, **UNKNOWN}).summary['encoder_eccentricity_rad']
     assert found == {'upper': pytest.approx(0.01, rel=0.02), 'lower': pytest.approx(0.006, rel=0.02)}
-
-
-def test_a_wheel_that_hardly_turns_is_refused():
-    with pytest.raises(ValueError, match='at least 3 turns'):
-        eccentricity.fit(np.arange(100) * 1e-3, np.arange(100), 4096)
