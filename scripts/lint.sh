@@ -7,9 +7,10 @@ cd "$(dirname "$(realpath "$0")")/.."
 
 check_format() {
   git ls-files '*.cpp' '*.hpp' | xargs clang-format-16 --dry-run --Werror
-  # A source says what it is for before its first declaration.
+  # A source says what it is for: a header before its first declaration, a .cpp in its first line.
   # shellcheck disable=SC2016 # of awk
   git ls-files 'src/*pp' 'apps/*pp' 'include/*pp' | xargs awk 'FNR == 1 { looked = 0 }
+    FNR == 1 && FILENAME ~ /cpp$/ && !/^\/\// { print FILENAME ": its first line does not say what it is for"; bad = 1 }
     looked || /^(#|$|namespace|using|extern|}|")/ { next }
     { looked = 1; if ($0 !~ /^ *\/[\/*]/) { print FILENAME ": no sentence says what it is for"; bad = 1 } }
     END { exit bad }'

@@ -1,3 +1,4 @@
+// Takes the metrics of a run from its records, and says why one is missing.
 #include "analysis/run_metrics.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Finds experiments by name or file, and reads each file once in a process.
 #include "config/library.hpp"
 
 #include <fmt/format.h>

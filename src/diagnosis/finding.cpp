@@ -1,3 +1,4 @@
+// Findings of `doctor` and `latency` as text and as JSON.
 #include "diagnosis/finding.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// The table of backends; it refuses an entry that lacks a driver, a safe-state writer or limits.
 #include <algorithm>
 #include <stdexcept>
 #include <string>

@@ -1,3 +1,4 @@
+// Faults of the emulated CAN node: what it does not hear, and how its frames go wrong.
 #include <algorithm>
 #include <array>
 #include <utility>

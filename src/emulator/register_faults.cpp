@@ -1,3 +1,4 @@
+// Faults of single registers of the emulated PCI card.
 #include "emulator/register_faults.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// The emulated RT-DAC/USB2: it takes a frame, drives the simulated rig, and answers with one.
 #include "emulator/usb_board_model.hpp"
 
 #include <algorithm>

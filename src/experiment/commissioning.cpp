@@ -1,3 +1,4 @@
+// The steps of a commissioning, in their order, and what each must see before the next.
 #include "experiment/commissioning.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Steps through the phases of an experiment and tells what each asks of motor and brake.
 #include "experiment/sequence.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The guardian of one run: a process that outlives the run and makes the board safe after its end.
 #include <fcntl.h>
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// The run's side of a lease: it asks the resident service for the outputs, arms it and ends it.
 #include "guardian/guardian_lease.hpp"
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// Decides who guards a run: the resident service, a guardian of its own, or nobody in simulation.
 #include "guardian/guarding.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Messages to systemd, and a watch for the computer's sleep over its bus.
 #include "guardian/systemd.hpp"
 
 #include <poll.h>

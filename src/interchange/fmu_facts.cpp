@@ -1,3 +1,4 @@
+// Which variables of a foreign FMU carry which of our quantities, by its description and a mapping file.
 #include "interchange/fmu_facts.hpp"
 
 #include <fmt/format.h>

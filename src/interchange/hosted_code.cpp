@@ -1,3 +1,4 @@
+// Starts the process of foreign code, passes each call on by a socket, and says how the process ended.
 #include "interchange/hosted_code.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// Finds the process that has a board open, by the files below /proc.
 #include <dirent.h>
 #include <fcntl.h>
 #include <poll.h>

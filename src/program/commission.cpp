@@ -1,3 +1,4 @@
+// `abs_hil commission`: the first steps with a rig, as questions in the terminal.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Opens a run's CSV, logs, summary and folder before it begins, and completes them at its end.
 #include "program/run_outputs.hpp"
 
 #include <spdlog/spdlog.h>

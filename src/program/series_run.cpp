@@ -1,3 +1,4 @@
+// Runs the members of a series one after the other, with a pause in between, and keeps its folder.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>

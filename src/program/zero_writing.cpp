@@ -1,3 +1,4 @@
+// Writes zeros to all boards at once, each from a thread of its own, so that none waits for another.
 #include "program/zero_writing.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Compares a recorded run with its recomputation, bit by bit, and names the first difference.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Reads a recorded run from its event log, with the settings that it had.
 #include "replay/recorded_run.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The report of a replay: recorded and replayed figures side by side.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Tells where a JSON or TOML text nests deeper than the parsers' stack allows.
 #include "rig/nesting.hpp"
 
 #include <algorithm>

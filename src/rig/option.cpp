@@ -1,3 +1,4 @@
+// Ranges, allowed names and safety classes of options, in words.
 #include "abs_hil/rig/option.hpp"
 
 #include <charconv>

@@ -1,3 +1,4 @@
+// The summary of a run as JSON, and whole runs in virtual time.
 #include "run/run_summary.hpp"
 
 #include <fmt/format.h>

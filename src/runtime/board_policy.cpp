@@ -1,3 +1,4 @@
+// What a run may do on hardware: it refuses virtual time, injected faults and weakened limits there.
 #include "runtime/board_policy.hpp"
 
 #include <fmt/format.h>

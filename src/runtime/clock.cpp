@@ -1,3 +1,4 @@
+// The clock of the cycle: CLOCK_MONOTONIC, and the time that the computer slept.
 #include "runtime/clock.hpp"
 
 #include <cerrno>

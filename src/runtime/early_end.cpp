@@ -1,3 +1,4 @@
+// Catches exit() and system calls by which a controller's code would end the program in mid-run.
 #include "runtime/early_end.hpp"
 
 #include <dlfcn.h>

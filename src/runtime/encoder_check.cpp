@@ -1,3 +1,4 @@
+// Judges each reading of the encoders: can the wheels have done this, and do they turn at all?
 #include "runtime/encoder_check.hpp"
 
 #include <array>

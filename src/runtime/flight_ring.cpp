@@ -1,3 +1,4 @@
+// Writes and reads the flight recorder's ring, which survives the death of its writer.
 #include "runtime/flight_ring.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Makes the process real-time: scheduling, locked memory, processor, C-states; with the fix for each failure.
 #include "runtime/realtime_setup.hpp"
 
 #include <fcntl.h>

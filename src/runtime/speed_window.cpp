@@ -1,3 +1,4 @@
+// Windows of readings: mean speeds and commands over some 2 ms; stale readings and leaps are faults.
 #include "runtime/speed_window.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Finds options that weaken a board's protection, and whether a person consented by a key.
 #include "runtime/weak_values.hpp"
 
 #include <algorithm>

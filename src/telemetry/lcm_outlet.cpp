@@ -1,3 +1,4 @@
+// Publishes on LCM, and never waits for a tcpq server that accepts no data.
 #include "telemetry/lcm_outlet.hpp"
 
 #include <limits>

@@ -1,3 +1,4 @@
+// Receives what other programs publish over LCM, and finds a tcpq server again that restarts.
 #include "telemetry/receiver.hpp"
 
 #include <poll.h>

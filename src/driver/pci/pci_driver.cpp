@@ -1,3 +1,4 @@
+// The driver of the RT-DAC4/PCI: activation, one cycle of register accesses, safe state.
 #include "driver/pci/pci_driver.hpp"
 
 #include <utility>

@@ -1,3 +1,4 @@
+// Names of the card's registers, and the speed that its own counter shows.
 #include "driver/pci/register_map.hpp"
 
 #include <numbers>

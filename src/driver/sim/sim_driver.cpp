@@ -1,3 +1,4 @@
+// The simulated rig as a board: it moves the plant on between two readings.
 #include "driver/sim/sim_driver.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Makes an RT-DAC/USB2 safe from a second process, after its owner's end.
 #include "driver/usb/usb_safe_state.hpp"
 
 #include "driver/usb/usb_driver.hpp"

@@ -1,3 +1,4 @@
+// A slip controller as a model for export as an FMU.
 #include "interchange/fmu/controller_model.hpp"
 
 #include <algorithm>
