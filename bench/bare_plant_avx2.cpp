@@ -1,3 +1,4 @@
+// The bare plant of bare_plant.hpp, four runs at once by AVX2.
 #define BARE_PLANT_LANES 4
 #include "bare_plant.hpp"
 

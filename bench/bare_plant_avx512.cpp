@@ -1,3 +1,4 @@
+// The bare plant of bare_plant.hpp, eight runs at once by AVX-512.
 #define BARE_PLANT_LANES 8
 #include "bare_plant.hpp"
 

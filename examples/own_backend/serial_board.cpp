@@ -1,3 +1,4 @@
+// The board on a serial line: its options, its driver, its safe-state writer and its entry in the registry.
 #include "serial_board.hpp"
 
 #include <filesystem>

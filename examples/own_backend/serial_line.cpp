@@ -1,3 +1,4 @@
+// Lines of text to and from the board, over a port of the kernel.
 #include "serial_line.hpp"
 
 #include <fcntl.h>

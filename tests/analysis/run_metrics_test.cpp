@@ -1,3 +1,4 @@
+// Metrics of made-up brakings whose figures are known in closed form.
 #include "analysis/run_metrics.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// A run's summary, as text and as JSON: what it holds, and what it says of what is missing.
 #include "analysis/run_summary.hpp"
 
 #include <string>

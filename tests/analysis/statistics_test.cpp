@@ -1,3 +1,4 @@
+// Quantiles, means and intervals against NumPy's figures and printed tables.
 #include "analysis/statistics.hpp"
 
 #include <array>

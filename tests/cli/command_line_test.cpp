@@ -1,3 +1,4 @@
+// The parser of the command line: its answers, messages and statuses.
 #include "cli/command_line.hpp"
 
 #include <iostream>

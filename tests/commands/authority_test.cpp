@@ -1,3 +1,4 @@
+// Who may command a run from elsewhere: keys, message authentication, sequence numbers.
 #include "commands/authority.hpp"
 
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// The listener for commands over LCM: which ones it takes, and what it answers.
 #include "commands/command_listener.hpp"
 
 #include <thread>

@@ -1,3 +1,4 @@
+// Changes of a running controller from elsewhere, up to the end of the run.
 #include "commands/remote_commands.hpp"
 
 #include <sys/stat.h>

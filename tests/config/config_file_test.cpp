@@ -1,3 +1,4 @@
+// Configuration files: every kind of value, and messages that name file and line.
 #include "config/config_file.hpp"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// The table of configuration keys: setting values by name, and what is refused.
 #include "config/key_table.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// From an experiment's script to the plan of its phases.
 #include "config/plan.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// The file of a rig of one's own that `abs_hil init-rig` writes.
 #include <fstream>
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// The JSON schema of experiments: it is the parser's own, and knows every key.
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>

@@ -1,3 +1,4 @@
+// Reading an experiment's script: quantities and their units, names, explanations.
 #include "config/script.hpp"
 
 #include <cmath>

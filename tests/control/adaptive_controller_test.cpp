@@ -1,3 +1,4 @@
+// The paper's controller with Table 1's gains, on the bench's own plant: its stops and its slip.
 #include "control/adaptive_controller.hpp"
 
 #include <algorithm>

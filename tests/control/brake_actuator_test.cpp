@@ -1,3 +1,4 @@
+// The brake's map and lag, and their inverse, in closed form.
 #include "control/brake_actuator.hpp"
 
 #include <cmath>

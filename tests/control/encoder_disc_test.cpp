@@ -1,3 +1,4 @@
+// Eccentric discs: what is learnt of them from coasting wheels, and what it saves the observer.
 #include "control/encoder_disc.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The five phases of the classic ABS, on a wheel whose acceleration is prescribed.
 #include "control/five_phase_controller.hpp"
 
 #include <stdexcept>

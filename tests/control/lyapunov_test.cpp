@@ -1,3 +1,4 @@
+// The Lyapunov equation, solved for random gains and for Table 1's by hand.
 #include <Eigen/LU>
 #include <limits>
 #include <random>

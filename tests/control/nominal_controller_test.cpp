@@ -1,3 +1,4 @@
+// The law for a known tyre: e_v decays as the sum of two exponentials.
 #include "control/nominal_controller.hpp"
 
 #include <cmath>

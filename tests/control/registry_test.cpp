@@ -1,3 +1,4 @@
+// The table of controllers: making one by name, adding one, and what is refused.
 #include "abs_hil/control/registry.hpp"
 
 #include <cmath>

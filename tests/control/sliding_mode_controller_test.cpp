@@ -1,3 +1,4 @@
+// Sliding mode: the law as written, and its reaching time.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,3 +1,4 @@
+// The sampled-data form of (16) against the printed one.
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The integral of the slip error is the trapezoid over the time that passed.
 #include "control/slip_error_integral.hpp"
 
 #include "catch.hpp"

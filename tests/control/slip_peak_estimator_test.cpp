@@ -1,3 +1,4 @@
+// The filter that finds the peak of a tyre's curve, on curves of its own and of other families.
 #include "control/slip_peak_estimator.hpp"
 
 #include <algorithm>

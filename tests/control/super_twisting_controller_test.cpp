@@ -1,3 +1,4 @@
+// Super-twisting: its implicit step, its continuous limit, perturbations with a bounded slope.
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// The switching estimate of theta, and its bounds.
 #include <cmath>
 #include <limits>
 #include <random>

@@ -1,3 +1,4 @@
+// The estimate of theta by (17)-(18): rates of convergence, projection, standing wheels.
 #include "control/theta_estimator.hpp"
 
 #include <algorithm>

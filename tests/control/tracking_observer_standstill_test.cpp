@@ -1,3 +1,4 @@
+// The speed observer around standstill: stops, flicker of a count, slow turning, reversal.
 #include <algorithm>
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// The speed observer against the continuous one with its triple pole.
 #include "control/tracking_observer.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The observer of speeds and tyre force: its errors and delay beside the paper's controller.
 #include "control/wheel_force_observer.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// What `abs_hil doctor` says of boards and of what keeps them from use.
 #include "catch.hpp"
 #include "diagnosis/doctor.hpp"
 

@@ -1,3 +1,4 @@
+// What `abs_hil doctor` says of a CAN interface.
 #include "catch.hpp"
 #include "diagnosis/doctor.hpp"
 

@@ -1,3 +1,4 @@
+// The doctor's verdict on a backend, from a board that is there or not.
 #include "diagnosis/doctor.hpp"
 
 #include <nlohmann/json.hpp>

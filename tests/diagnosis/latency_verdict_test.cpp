@@ -1,3 +1,4 @@
+// How `abs_hil latency` grades jitter, missed ticks and full periods.
 #include "diagnosis/latency_verdict.hpp"
 
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// Facts about a computer's real-time fitness, from made-up /proc and /sys.
 #include "diagnosis/machine_facts.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The lifecycle of every driver: nothing reaches the board outside activation, and failures end safe.
 #include <cstdint>
 #include <stdexcept>
 #include <string>

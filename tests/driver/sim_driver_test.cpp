@@ -1,3 +1,4 @@
+// The simulated rig as a board: when it obeys, and its steps of duty.
 #include "driver/sim/sim_driver.hpp"
 
 #include <cmath>

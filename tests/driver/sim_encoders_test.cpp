@@ -1,3 +1,4 @@
+// The counters of the simulated rig: their phase, wrap and true angles.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

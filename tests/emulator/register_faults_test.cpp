@@ -1,3 +1,4 @@
+// Faults of the emulated card's registers: each does what its name says.
 #include "emulator/register_faults.hpp"
 
 #include <set>

@@ -1,3 +1,4 @@
+// The record of a commissioned board: a run needs one, and it holds for this board alone.
 #include "experiment/board_record.hpp"
 
 #include <cstdlib>

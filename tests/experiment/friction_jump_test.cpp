@@ -1,3 +1,4 @@
+// The experiment friction-jump on all plants.
 #include <cmath>
 
 #include "catch.hpp"

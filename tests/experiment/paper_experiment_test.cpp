@@ -1,3 +1,4 @@
+// The paper's experiment: its phases, their order, and what never happens together.
 #include "catch.hpp"
 #include "simulated_run.hpp"
 

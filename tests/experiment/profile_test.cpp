@@ -1,3 +1,4 @@
+// Profiles over the time of a phase: steps, straight lines, ends.
 
 #include <limits>
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// The logic of a run between measurement and command: estimates, distances, adjustments.
 #include "experiment/run_logic.hpp"
 
 #include <bit>

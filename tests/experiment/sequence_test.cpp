@@ -1,3 +1,4 @@
+// The sequence of phases: conditions, time limits, faults, and the latch.
 #include "experiment/sequence.hpp"
 
 #include <limits>

@@ -1,3 +1,4 @@
+// The experiment slip-sweep finds the tyre's curve and its peak.
 #include <cmath>
 #include <nlohmann/json.hpp>
 

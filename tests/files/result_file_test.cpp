@@ -1,3 +1,4 @@
+// Files of results appear whole or not at all.
 #include "files/result_file.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// The guardian as a process: hand-over, delays, and the end of its run.
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// The messages of a lease between a run and the resident service.
 #include "guardian/lease_wire.hpp"
 
 #include <sys/socket.h>

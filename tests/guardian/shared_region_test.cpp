@@ -1,3 +1,4 @@
+// The memory that a run shares with its guard: who may write which part.
 #include "guardian/shared_region.hpp"
 
 #include <fcntl.h>

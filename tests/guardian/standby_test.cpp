@@ -1,3 +1,4 @@
+// The standby: when it stops a run that its guard no longer watches.
 #include "guardian/standby.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// The guardian's watchdog over the cycles of a run, in virtual time.
 #include "guardian/watchdog.hpp"
 
 #include "catch.hpp"

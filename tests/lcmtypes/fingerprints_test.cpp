@@ -1,3 +1,4 @@
+// The LCM types have their published fingerprints.
 #include <cstdint>
 #include <fstream>
 #include <map>

@@ -1,3 +1,4 @@
+// The integrator's order, its error at the default step, and its steps near standstill.
 #include <algorithm>
 #include <cmath>
 #include <vector>

@@ -1,3 +1,4 @@
+// Motor and brake of the plant against closed forms.
 #include <cmath>
 
 #include "abs_hil/plant_sim/plant.hpp"

@@ -1,3 +1,4 @@
+// Rate limit, dead time, hysteresis and other flaws of the brake, in closed form.
 #include <cmath>
 #include <vector>
 

@@ -1,3 +1,4 @@
+// Motions of the wheels that have a closed form.
 #include <cmath>
 
 #include "abs_hil/plant_sim/plant.hpp"

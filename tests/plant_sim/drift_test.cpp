@@ -1,3 +1,4 @@
+// A brake that fades and cools, and bearings that dry, in closed form.
 #include <cmath>
 #include <stdexcept>
 

@@ -1,3 +1,4 @@
+// Standing and locked wheels: they stay at zero, and break away when they must.
 #include <cmath>
 
 #include "abs_hil/plant_sim/plant.hpp"

@@ -1,3 +1,4 @@
+// Encoders: counts, wraps, and discs with flaws.
 #include "plant_sim/encoder.hpp"
 
 #include <algorithm>

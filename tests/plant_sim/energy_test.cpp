@@ -1,3 +1,4 @@
+// Energy of the wheels: it only falls without the motor, and work and loss add up.
 #include <random>
 
 #include "abs_hil/plant_sim/plant.hpp"

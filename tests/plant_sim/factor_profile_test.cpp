@@ -1,3 +1,4 @@
+// The text of a friction profile and its pieces.
 #include "abs_hil/plant_sim/factor_profile.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Friction that changes over time or distance acts at its very instant or place.
 #include <algorithm>
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// A plain Euler integration of the equations agrees with the plant.
 #include <algorithm>
 #include <cmath>
 

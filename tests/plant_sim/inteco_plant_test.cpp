@@ -1,3 +1,4 @@
+// The maker's model against the equations of its manual.
 #include <algorithm>
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// The normal force: constant, and by the lever.
 #include "abs_hil/plant_sim/load_models.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Options of the plant outside their range are refused by name.
 #include <functional>
 #include <limits>
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// The tyres' curves against published coefficients in 40-digit arithmetic.
 #include "abs_hil/plant_sim/tyre_models.hpp"
 
 #include <cmath>

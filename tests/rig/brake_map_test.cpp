@@ -1,3 +1,4 @@
+// The brake's static map (7) and its inverse.
 #include "abs_hil/rig/brake_map.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Counts and angles.
 #include "rig/encoder_scale.hpp"
 
 #include <cstdint>

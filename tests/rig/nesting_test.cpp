@@ -1,3 +1,4 @@
+// Texts in JSON and TOML that nest too deep are refused at the same depth everywhere.
 #include "rig/nesting.hpp"
 
 #include <string>

@@ -1,3 +1,4 @@
+// Rows of options: visiting, ranges, names.
 #include "abs_hil/rig/option.hpp"
 
 #include <cstdint>

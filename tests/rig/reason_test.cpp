@@ -1,3 +1,4 @@
+// The table of reasons: published numbers, values, words.
 #include "abs_hil/rig/reason.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Functions of the packs' scalar against the C library's long double.
 #include "abs_hil/rig/scalar.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Names of a controller's own signals.
 #include "abs_hil/rig/signals.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// The tyre's curve (4) and the slip (5).
 #include "abs_hil/rig/tyre_curve.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// Text from elsewhere is cleaned before it goes into a file.
 #include "run_folder/clean_text.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// Run folders: making one, its name, its seal.
 #include "run_folder/run_folder.hpp"
 
 #include <fstream>

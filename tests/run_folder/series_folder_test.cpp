@@ -1,3 +1,4 @@
+// Folders of series: going on after an interruption, and what is refused.
 #include "run_folder/series_folder.hpp"
 
 #include <fstream>

@@ -1,3 +1,4 @@
+// What the safety policy allows a run on hardware, and what it says otherwise.
 #include "runtime/board_policy.hpp"
 
 #include <filesystem>

@@ -1,3 +1,4 @@
+// The cycle: its ticks, its times, its records, its end.
 #include "runtime/cyclic_executive.hpp"
 
 #include "catch.hpp"

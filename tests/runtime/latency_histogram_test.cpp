@@ -1,3 +1,4 @@
+// Histograms of durations: bins, ends, quantiles.
 #include <algorithm>
 #include <cmath>
 #include <memory>

@@ -1,3 +1,4 @@
+// The schedules of the model checker in memory_model.hpp.
 #include "memory_model.hpp"
 
 namespace abs_hil::runtime::test {

@@ -1,3 +1,4 @@
+// The set-up for real time: each step says what it saw.
 #include "runtime/realtime_setup.hpp"
 
 #include <pthread.h>

@@ -1,3 +1,4 @@
+// From the ring of records to all sinks; and the distance of a run.
 #include "runtime/record_pump.hpp"
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// The ring between the cycle and its reader.
 #include "runtime/spsc_ring.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// Tables of a comparison, from made-up runs.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// Comparing controllers on the same varied plants.
 #include "study/comparison.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// The list of controllers with settings of their own.
 #include <fmt/format.h>
 
 #include <fstream>

@@ -1,3 +1,4 @@
+// Calling a function for many indices from several threads.
 #include "study/parallel.hpp"
 
 #include <atomic>

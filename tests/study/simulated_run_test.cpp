@@ -1,3 +1,4 @@
+// One run of a study has the figures of a whole run.
 #include "study/simulated_run.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// Variations of the plant: their text, ranges and random numbers.
 #include "study/variation.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// A run's CSV: header, rows, extreme values.
 #include "telemetry/csv_sink.hpp"
 
 #include <bit>

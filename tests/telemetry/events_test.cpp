@@ -1,3 +1,4 @@
+// Events of a run, from its records.
 #include "telemetry/events.hpp"
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// Publishing on LCM: delivery, losses, URLs that it cannot use.
 #include "telemetry/lcm_outlet.hpp"
 
 #include "catch.hpp"

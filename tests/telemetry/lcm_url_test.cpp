@@ -1,3 +1,4 @@
+// The parts of an LCM URL, and whether there is a route.
 #include "telemetry/lcm_url.hpp"
 
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// Event logs: read back, times, replacing an older one.
 #include "telemetry/log_outlet.hpp"
 
 #include <fstream>

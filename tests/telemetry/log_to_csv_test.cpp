@@ -1,3 +1,4 @@
+// From an event log to the CSV of the same run.
 
 #include <sys/resource.h>
 

@@ -1,3 +1,4 @@
+// From a record to a message and back, also in older logs.
 #include "telemetry/message_codec.hpp"
 
 #include <bit>

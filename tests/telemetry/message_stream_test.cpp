@@ -1,3 +1,4 @@
+// The stream of a run's messages: order, decimation, status.
 #include "telemetry/message_stream.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The status line in a terminal.
 #include "telemetry/status_line.hpp"
 
 #include <fcntl.h>

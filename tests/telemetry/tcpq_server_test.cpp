@@ -1,3 +1,4 @@
+// Whether a tcpq server takes data.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>

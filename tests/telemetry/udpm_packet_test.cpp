@@ -1,3 +1,4 @@
+// LCM's packets over UDP: whole, in fragments, and broken.
 #include <string>
 #include <vector>
 

@@ -1,3 +1,4 @@
+// Which CAN frames belong to the answer, and how many losses are tolerated.
 #include "driver/can/answer_tracker.hpp"
 
 #include "catch.hpp"

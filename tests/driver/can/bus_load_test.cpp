@@ -1,3 +1,4 @@
+// The load of the CAN bus: worst-case stuffing of a frame, and the documented configurations.
 #include <vector>
 
 #include "catch.hpp"

@@ -1,3 +1,4 @@
+// The CAN driver on the emulated node: counts, signs, losses, faults.
 #include "driver/can/can_driver.hpp"
 
 #include <numbers>

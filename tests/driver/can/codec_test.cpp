@@ -1,3 +1,4 @@
+// The CAN protocol: places of signals, its check, and frames by hand.
 #include <cmath>
 #include <random>
 

@@ -1,3 +1,4 @@
+// Sending and receiving CAN frames through a socket of the kernel.
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <sys/socket.h>

@@ -1,3 +1,4 @@
+// The CAN backend for the contract tests, on the emulated node.
 #include <memory>
 
 #include "../can/node_on_socket.hpp"

@@ -1,3 +1,4 @@
+// The hm2 backend for the contract tests, on the emulated board.
 #include <memory>
 
 #include "../hm2/register_board.hpp"

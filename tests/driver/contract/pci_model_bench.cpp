@@ -1,3 +1,4 @@
+// The PCI backend for the contract tests, on the emulated card.
 #include <algorithm>
 
 #include "../pci/model_card.hpp"

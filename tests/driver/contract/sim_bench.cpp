@@ -1,3 +1,4 @@
+// The simulated rig for the contract tests.
 #include "bench.hpp"
 #include "driver/sim/sim_driver.hpp"
 

@@ -1,3 +1,4 @@
+// The USB backend for the contract tests, on the emulated board.
 #include "../usb/model_board.hpp"
 #include "bench.hpp"
 

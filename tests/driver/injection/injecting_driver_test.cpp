@@ -1,3 +1,4 @@
+// Injected faults, cycle by cycle: what each does to readings and commands, and when.
 #include "driver/injection/injecting_driver.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The text of an injected fault: what is parsed, and what is refused.
 #include "driver/injection/injection.hpp"
 
 #include <cmath>

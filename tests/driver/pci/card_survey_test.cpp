@@ -1,3 +1,4 @@
+// The doctor's search for PCI cards, in a made-up tree of devices.
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
 #include "driver/pci/discovery.hpp"

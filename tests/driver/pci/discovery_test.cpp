@@ -1,3 +1,4 @@
+// Finding and claiming the one PCI card, in a made-up tree of devices.
 #include "driver/pci/discovery.hpp"
 
 #include <sys/wait.h>

@@ -1,3 +1,4 @@
+// The PCI driver's accesses to the emulated card, one by one.
 #include "driver/pci/pci_driver.hpp"
 
 #include <algorithm>

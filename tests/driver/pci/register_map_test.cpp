@@ -1,3 +1,4 @@
+// The card's registers and their conversions, by figures worked by hand.
 #include "driver/pci/register_map.hpp"
 
 #include <cmath>

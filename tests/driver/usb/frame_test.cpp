@@ -1,3 +1,4 @@
+// The frames of the RT-DAC/USB2, word by word.
 #include "driver/usb/frame.hpp"
 
 #include <random>

@@ -1,3 +1,4 @@
+// What the USB backend tells people about a board that it cannot open.
 #include <stdexcept>
 
 #include "catch.hpp"

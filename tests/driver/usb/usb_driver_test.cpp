@@ -1,3 +1,4 @@
+// The USB driver on the emulated board: channels, wraps, other PWMs, losses.
 #include "driver/usb/usb_driver.hpp"
 
 #include <string>

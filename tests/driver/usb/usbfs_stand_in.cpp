@@ -1,3 +1,4 @@
+// A stand-in for the kernel's usbfs, with queues and a clock of its own.
 #include "usbfs_stand_in.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Reads the files that a faulty run leaves, and says what is wrong with them.
 #include "kept_files.hpp"
 
 #include <algorithm>

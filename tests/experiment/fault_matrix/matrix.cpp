@@ -1,3 +1,4 @@
+// Rows and columns of the fault matrix: faults, phases, rigs, and what each must lead to.
 #include "matrix.hpp"
 
 #include <memory>

@@ -1,3 +1,4 @@
+// The rigs of the fault matrix, each a backend in this process.
 #include "matrix_rig.hpp"
 
 #include "driver/hm2/register_board.hpp"

@@ -1,3 +1,4 @@
+// The command gate: limits, faults and the latch.
 #include "runtime/command_gate.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The check of encoders: speeds that a wheel can have, standing wheels, slip.
 #include "runtime/encoder_check.hpp"
 
 #include <cmath>

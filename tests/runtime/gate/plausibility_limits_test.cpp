@@ -1,3 +1,4 @@
+// Bounds of plausibility follow from the rig's torques and inertias.
 #include "runtime/plausibility_limits.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// The check that the wheels answer to motor and brake.
 #include "runtime/response_check.hpp"
 
 #include <algorithm>

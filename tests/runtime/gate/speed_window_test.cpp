@@ -1,3 +1,4 @@
+// Windows of readings: mean speeds, stale readings, leaps.
 #include "runtime/speed_window.hpp"
 
 #include <limits>

@@ -1,3 +1,4 @@
+// Options that weaken a board's protection, and the keys that consent to them.
 #include "runtime/weak_values.hpp"
 
 #include <string>

@@ -1,3 +1,4 @@
+// Counts allocations and locks of a thread by functions put before the C library's.
 #include "interposed.hpp"
 
 #include <dlfcn.h>

@@ -1,3 +1,4 @@
+// Runs in lanes have the bits of runs alone, for every law and plant.
 #include <bit>
 #include <cstdlib>
 #include <random>

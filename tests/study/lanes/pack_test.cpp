@@ -1,3 +1,4 @@
+// Each lane of a pack computes as a double does.
 #include "rig/pack.hpp"
 
 #include <bit>
