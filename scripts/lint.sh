@@ -7,7 +7,8 @@ cd "$(dirname "$(realpath "$0")")/.."
 
 # The parts of a check are joined, because `||` at its call switches off -e within.
 check_format() {
-  # A source says what it is for: a .cpp in its first line, a header before its first declaration. One is whole on a page.
+  # A source says what it is for: a .cpp in its first line, a header before its first declaration. A page
+  # shows all of tests/example_controller, so that is left out.
   # shellcheck disable=SC2016 # of awk
   git ls-files '*.cpp' '*.hpp' | xargs clang-format-16 --dry-run --Werror &&
     git ls-files '*.cpp' ':!tests/example_controller' | xargs awk '

@@ -1,4 +1,4 @@
-// The experiment friction-jump on all plants.
+// The experiment friction-jump: its road, what the estimate makes of it, and stops of the maker's plant.
 #include <cmath>
 
 #include "catch.hpp"

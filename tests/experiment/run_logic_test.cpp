@@ -1,4 +1,4 @@
-// The logic of a run between measurement and command: estimates, distances, adjustments.
+// The logic of a run between measurement and command: estimates, the stop brake, phases in a row.
 #include "experiment/run_logic.hpp"
 
 #include <bit>

@@ -1,4 +1,4 @@
-// Motor and brake of the plant against closed forms.
+// Motor and brake of the plant: what they do at each duty, with the real and the ideal actuator.
 #include <cmath>
 
 #include "abs_hil/plant_sim/plant.hpp"

@@ -1,4 +1,4 @@
-// A brake that fades and cools, and bearings that dry, in closed form.
+// Parameters that drift: a brake that fades, bearings that dry, a motor that weakens, in closed form.
 #include <cmath>
 #include <stdexcept>
 

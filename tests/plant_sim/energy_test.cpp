@@ -1,4 +1,4 @@
-// Energy of the wheels: it only falls without the motor, and work and loss add up.
+// Without the motor the wheels' kinetic energy never grows, whatever the rig and the brake.
 #include <random>
 
 #include "abs_hil/plant_sim/plant.hpp"

@@ -1,4 +1,4 @@
-// The normal force: constant, and by the lever.
+// The normal force by the lever: its value by hand, its bounds, where a held wheel breaks away.
 #include "abs_hil/plant_sim/load_models.hpp"
 
 #include <cmath>

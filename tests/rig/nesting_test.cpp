@@ -1,4 +1,4 @@
-// Texts in JSON and TOML that nest too deep are refused at the same depth everywhere.
+// Texts in JSON and TOML are parsed up to the limit of their nesting, and refused beyond it.
 #include "rig/nesting.hpp"
 
 #include <string>

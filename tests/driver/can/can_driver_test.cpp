@@ -1,4 +1,4 @@
-// The CAN driver on the emulated node: counts, signs, losses, faults.
+// The CAN driver on the emulated node: counts, signs, caps, the node's watchdog and flags.
 #include "driver/can/can_driver.hpp"
 
 #include <numbers>

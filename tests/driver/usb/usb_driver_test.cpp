@@ -1,4 +1,4 @@
-// The USB driver on the emulated board: channels, wraps, other PWMs, losses.
+// The USB driver on the emulated board: channels, wraps, order of writes, versions.
 #include "driver/usb/usb_driver.hpp"
 
 #include <string>

@@ -1,4 +1,4 @@
-// Runs in lanes have the bits of runs alone, for every law and plant.
+// Runs in lanes have the bits of runs alone, for every law of ours, plant and road.
 #include <bit>
 #include <cstdlib>
 #include <random>
