@@ -54,6 +54,13 @@ def test_the_model_file_has_them(flawed, tmp_path):
         assert believed[f'model.{name}']['value'] == content['plant'][name] != 0.0
 
 
+def test_one_run_in_which_the_wheels_coast_is_enough_for_the_discs():
+    """The commands of docs/plants.md."""
+    found = abs_hil.identify([log_of('coast-and-brake', TRUTH | DISCS, (0.3, 0.8))], form='magic-formula')
+    for key, value in DISCS.items():
+        holds(found, key.removeprefix('plant.'), value, 0.02 if 'phase' in key else 3e-5)
+
+
 def test_counters_that_begin_anew_leave_the_phase_open(tmp_path):
     logs = logs_of(DISCS)
     for log, begins_at in zip(logs, (0, 1000, 2500, 3300)):
