@@ -36,6 +36,7 @@ AdaptiveOptimalOptions<> counted(AdaptiveOptimalOptions<> options, const rig::Ri
   options.bank.zero_error_m_s *= coarser;
   if (coarser > 1.0) {
     options.bank.jump_least_N *= std::sqrt(coarser);
+    options.bank.jump_slip_m_s *= std::sqrt(coarser);
     options.play_Nm *= std::sqrt(coarser);
     options.search_part = std::min(most_search_part, options.search_part * std::sqrt(coarser));
   }

@@ -94,7 +94,9 @@ S AdaptiveOptimalLaw<S>::next_reference(const S& dt_s) noexcept {
   // A peak that turns out to be near must not be passed: only a rise takes time.
   reference_ = rig::smaller(target, reference_ * largest_rise_);
   search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
-  const S search = options_.search_part * rig::sine(search_rad_);
+  // Where the slip runs away behind the peak, a search passes the peak and costs more than it finds.
+  const S part = options_.search_part * rig::larger(S(0.0), S(1.0 - bank_.runaway()));
+  const S search = part * rig::sine(search_rad_);
   return reference_ * (1.0 + search) - bank_.slip_zero();
 }
 

@@ -60,10 +60,12 @@ template <class S>
 void BasicFrictionBank<S>::reset(const Start& start) noexcept
   requires std::is_same_v<S, double>
 {
-  using friction_bank::zero_max;
+  using friction_bank::zero_max, friction_bank::zero_move_max;
   const double zero = std::clamp(-start.slip, -zero_max, zero_max);
   const double spread = std::sqrt(square(options_.zero_error_m_s) + square(start.swing_m_s)) / start.car_speed_m_s +
                         options_.zero_error_per_N * std::abs(start.force_N);
+  zero_least_ = zero - zero_move_max - spread;
+  zero_most_ = zero + zero_move_max + spread;
   for (Members& m : bank_) {
     m.theta_N = options_.level0_N;
     m.zero = zero;

@@ -18,12 +18,15 @@
 //   runaway      Ri = runaway_per_N theta (-phi''(L)) L / 10                  of the slip, a tenth past the peak
 //
 // N, eF, et, sv and a are the options force_noise_N2_s, force_error, timing_error_s, slip_noise_m_s and share_per_s.
+// z stays within 0.01, and its first standard deviation, of what the slip read as braking began.
 // q = h (level_drift_per_s + level_drift_unexplained_per_s (unexplained force / peak force)^2).
 // qz = h zero_drift_per_s. l. is the rate of the slip, 1/s. The radii are known to 1 % only, hence the zero. The share
 // a of the prior w0 keeps every member alive.
 //
-// Friction has jumped when the quick force differs from the curve's for `jump_confirm_s`. For `jump_hold_s` then
-// nothing is learnt but one factor of all heights: theta <- theta (1 + (1 - exp(-h / jump_time_constant_s)) r / F).
+// Friction has jumped when the quick force differs from the curve's, F, for `jump_confirm_s` by more than
+//   max(jump_least_N, jump_share peak force) + jump_slip_m_s F / (v peak slip) + the swing of the quick force,
+// of which the second is what an error of the slip does on the rising curve. For `jump_hold_s` then nothing is learnt
+// but one factor of all heights: theta <- theta (1 + (1 - exp(-h / jump_time_constant_s)) r / F).
 #pragma once
 
 #include <array>
@@ -218,6 +221,7 @@ class BasicFrictionBank {
   Words prior_{};         ///< the same for all shapes
   std::array<Members, shapes> bank_{};
   ForceDelay<S> late_slip_{};
+  S zero_least_{0.0}, zero_most_{0.0};
   S time_s_{0.0};
   S hold_s_{0.0};
   S unexplained_s_{0.0};

@@ -10,7 +10,10 @@ namespace friction_bank {
 // Bounds of the unknowns.
 inline constexpr double theta_min_N = 2.0;
 inline constexpr double theta_max_N = 500.0;
-inline constexpr double zero_max = 0.025;
+inline constexpr double zero_max = 0.025;  ///< as it is read
+// It is constant, but for what a curve of another form makes of it. If it wandered farther, the reference could follow
+// it down to no slip, and the brake would rest.
+inline constexpr double zero_move_max = 0.01;
 inline constexpr double theta_variance_min_N2 = 1e-9;
 inline constexpr double zero_variance_min = 1e-14;
 // The errors of force and slip that are not noise of single cycles last about this long.
@@ -125,7 +128,7 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
       weight = rig::select(compares, seen, weight);
     }
     theta_N = rig::select(learns, within(theta_N + gain_theta * residual, theta_min_N, theta_max_N), theta_N);
-    const Row moved = rig::select(learns, within(zero + gain_zero * residual, -zero_max, zero_max), zero);
+    const Row moved = rig::select(learns, within(zero + gain_zero * residual, zero_least_, zero_most_), zero);
     // What is on its way through the filter was computed with the old zero.
     const Row shift = by_slip[row] * (moved - zero);
     auto&& late = delay_of(m, row);
@@ -178,9 +181,12 @@ void BasicFrictionBank<S>::watch_for_jumps(const Data& data) noexcept {
   const S residual = data.quick_force_N - late_force_N_;
   if (const auto jumps = jumping(); rig::any(jumps)) follow_jump(jumps, data.dt_s, residual);
   const auto watches = time_s_ > options_.jump_after_s && data.car_speed_m_s > learning_m_s;
+  // What an error of the slip does to the force where the curve rises.
+  const S by_slip_N = options_.jump_slip_m_s * rig::larger(S(0.0), late_force_N_) /
+                      (peak_slip_ * rig::larger(data.car_speed_m_s, S(slip_speed_min_m_s)));
   const auto unexplained =
       rig::magnitude(residual) >
-      data.swing.quick_force_N + rig::larger(options_.jump_least_N, S(options_.jump_share * peak_force_N_));
+      data.swing.quick_force_N + by_slip_N + rig::larger(options_.jump_least_N, S(options_.jump_share * peak_force_N_));
   unexplained_s_ = rig::select(watches && unexplained, S(unexplained_s_ + data.dt_s), S(0.0));
   const S newest = data.dt_s / (unexplained_lasts_s + data.dt_s);
   unexplained_N_ = rig::select(watches, S(unexplained_N_ + newest * (residual - unexplained_N_)), S(0.0));

@@ -166,3 +166,23 @@ TEST_CASE(
   CHECK(fast < factor - 0.01);
   CHECK(slow < fast - 0.05);
 }
+
+TEST_CASE("Where the slip runs away within the brake's lag, nothing searches") {
+  // The largest swing of the reference about its mean over 0.3 s, over the peak: steep tyre, slow car; flat tyre, fast
+  // car.
+  const auto swing = [](const rig::TyreParameters& tyre, double least_rad_s, double most_rad_s) {
+    auto s = real_rig();
+    s.plant->tyre = tyre;
+    double least = 1.0, most = 0.0;
+    for (const auto& tick : bench::brake(s, "adaptive-optimal").ticks) {
+      if (tick.omega2 < least_rad_s || tick.omega2 > most_rad_s) continue;
+      const double part = (tick.output.slip_ref + tick.output.signals[1]) / tick.output.signals[0];
+      least = std::min(least, part);
+      most = std::max(most, part);
+    }
+    return most - least;
+  };
+  const double part = control::ControlOptions{}.adaptive_optimal.search_part;
+  CHECK(swing({30.0, 12.0, 1.4}, 60.0, 120.0) > 1.5 * part);
+  CHECK(swing({55.0, 38.0, 1.85}, 12.0, 25.0) < 0.3 * part);
+}

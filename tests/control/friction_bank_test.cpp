@@ -60,6 +60,8 @@ class Rolling {
   double road{1.0};
   double noise_N{0.0};
   double quick_slip_error{0.0};  ///< of the reading that is not delayed, while the slip rises
+  double quick_error_N{0.0};
+  double car_speed_m_s{10.0};
 
   void slip(double reading) {
     const double force = road * tyre_.theta_N * rig::normalised_tyre_force(tyre_, reading + zero_);
@@ -68,10 +70,10 @@ class Rolling {
     bank.learn({.dt_s = period_s,
                 .slip = reading + (time_s_ < 0.06 ? quick_slip_error : 0.0),
                 .late_slip = late_(q, reading),
-                .car_speed_m_s = 10.0,
+                .car_speed_m_s = car_speed_m_s,
                 .force_N = delayed_(q, force) + noise_N * normal_(random_),
                 .covered = q,
-                .quick_force_N = quick_});
+                .quick_force_N = quick_ + quick_error_N});
   }
   /// Slip up to `most` in 60 ms, then about it.
   void brake(double most, double lasts_s) {
@@ -292,6 +294,54 @@ TEST_CASE("A jump of friction moves the level within 40 ms and leaves the shape"
     CHECK(rolling.bank.jumps() >= 1);
     CHECK_THAT(rolling.bank.peak_force_N(), WithinRel(level * tyre.theta_N, 0.1));
     CHECK_THAT(rolling.bank.peak_slip(), WithinRel(peak_slip, 0.05));
+  }
+}
+
+TEST_CASE("A force that an error of the slip explains is no jump: the more so, the slower the car") {
+  const rig::TyreParameters tyre{23.0, 28.0, 1.68};
+  const control::FrictionBankOptions<> o;
+  const auto jumps_with = [&](double car_speed_m_s, double part) {
+    Rolling rolling{tyre};
+    rolling.brake(0.05, 0.4);
+    for (double t = 0.0; t < 0.1; t += period_s) rolling.slip(0.05);
+    const auto& bank = rolling.bank;
+    const double by_slip_N = o.jump_slip_m_s * bank.late_force_N() / (car_speed_m_s * bank.peak_slip());
+    rolling.car_speed_m_s = car_speed_m_s;
+    rolling.quick_error_N = part * (std::max(o.jump_least_N, o.jump_share * bank.peak_force_N()) + by_slip_N);
+    for (double t = 0.0; t < 0.01; t += period_s) rolling.slip(0.05);
+    return bank.jumps();
+  };
+  for (const double car_speed_m_s : {10.0, 3.0, 1.2}) {
+    CAPTURE(car_speed_m_s);
+    CHECK(jumps_with(car_speed_m_s, 0.97) == 0);
+    CHECK(jumps_with(car_speed_m_s, 1.03) == 1);
+  }
+}
+
+TEST_CASE("Whatever the data say, the slip at no force stays near what was read as braking began") {
+  const control::FrictionBankOptions<> o;
+  for (const double read : {0.0, 0.015}) {
+    control::FrictionBank bank{o, 1000.0, delay_s};
+    bank.reset({.slip = -read, .car_speed_m_s = 10.0, .force_N = 1.0});
+    const double room = 0.01 + o.zero_error_m_s / 10.0 + o.zero_error_per_N;
+    double least = 1.0, most = -1.0;
+    // A force that rises, then falls, and depends little on the slip: only a zero that wanders explains it.
+    for (int n = 0; n < 4000; ++n) {
+      const double slip = 0.02 + 0.015 * std::sin(0.03 * n);
+      const double force_N = n < 2000 ? 25.0 : 6.0;
+      bank.learn({.dt_s = period_s,
+                  .slip = slip,
+                  .late_slip = slip,
+                  .car_speed_m_s = 10.0,
+                  .force_N = force_N,
+                  .covered = 0.15,
+                  .quick_force_N = bank.late_force_N()});
+      least = std::min(least, bank.slip_zero());
+      most = std::max(most, bank.slip_zero());
+    }
+    CHECK(least >= read - room - 1e-12);
+    CHECK(most <= read + room + 1e-12);
+    CHECK(most - least > 0.01);
   }
 }
 

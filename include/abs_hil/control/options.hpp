@@ -159,11 +159,11 @@ struct FrictionBankOptions {
                  .meaning = "intensity of that force's noise, with 4096 counts a turn", .range = rig::positive(100));
   ABS_HIL_OPTION(double, force_error, 0.0087, .meaning = "part of the force that the curve need not explain",
                  .range = rig::positive(1));
-  ABS_HIL_OPTION(double, timing_error_s, 0.0005, .unit = "s", .meaning = "delay between slip and force left unknown",
+  ABS_HIL_OPTION(double, timing_error_s, 0.0008, .unit = "s", .meaning = "delay between slip and force left unknown",
                  .range = rig::from_zero(0.1));
   ABS_HIL_OPTION(double, slip_noise_m_s, 0.00154, .unit = "m/s", .meaning = "error of the difference of both speeds",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, start_s, 0.0096, .unit = "s", .meaning = "time at the start in which nothing is learnt",
+  ABS_HIL_OPTION(double, start_s, 0.013, .unit = "s", .meaning = "time at the start in which nothing is learnt",
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, slip0, 0.0545, .meaning = "median of the peak's slip before braking",
                  .range = rig::open_between(0, 1));
@@ -206,6 +206,10 @@ struct FrictionBankOptions {
                  .range = rig::positive(10));
   ABS_HIL_OPTION(double, jump_least_N, 2.2, .unit = "N", .meaning = "least unexplained force that is a friction jump",
                  .range = rig::positive(500));
+  ABS_HIL_OPTION(
+      double, jump_slip_m_s, 0.02, .unit = "m/s",
+      .meaning = "error of the difference of both speeds whose force is no friction jump, with 4096 counts a turn",
+      .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, jump_confirm_s, 0.0028, .unit = "s", .meaning = "time that it must last",
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, jump_hold_s, 0.0308, .unit = "s",
@@ -243,7 +247,7 @@ struct AdaptiveOptimalOptions {
                  .range = rig::between(0.01, 1));
   ABS_HIL_OPTION(double, authority_past_peak, 1.0, .meaning = "the same where the force falls as the slip grows",
                  .range = rig::between(0.01, 1));
-  ABS_HIL_OPTION(double, bold_slip, 0.4, .meaning = "slip that an unknown peak may cost at the start",
+  ABS_HIL_OPTION(double, bold_slip, 0.2, .meaning = "slip that an unknown peak may cost at the start",
                  .range = rig::positive(100));
   ABS_HIL_OPTION(double, model_error_per_s, 50.0, .unit = "1/s",
                  .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
