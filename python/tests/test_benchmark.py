@@ -136,7 +136,7 @@ def test_the_shipped_gains_are_those_of_the_search():
 
 def test_a_first_misreading_of_the_slip_does_not_fix_a_wrong_peak():
     """Few counts and a brake faster than the model's: while the torque rises the slip reads wrong. From that the law once took a
-    flat tyre for a steep one and braked twice as long, in one position of the wheels of four."""
+    flat tyre for a steep one and braked twice as long, in one position of the wheels of six."""
     case = cases.combined(777001, 53)[52]
     known = bounds.found([case], pathlib.Path(__file__).parents[2] / 'config/training/combined-bounds.json')
     found = run(Entry('adaptive-optimal', {}), [case], known, seeds=tuple(range(1, 13)))

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "catch.hpp"
+#include "control/adaptive_optimal_controller.hpp"
 #include "control/peak_bench.hpp"
 
 using namespace abs_hil;
 using namespace bench;
+using Catch::Matchers::WithinRel;
 
 namespace {
 
@@ -168,8 +171,7 @@ TEST_CASE(
 }
 
 TEST_CASE("Where the slip runs away within the brake's lag, nothing searches") {
-  // The largest swing of the reference about its mean over 0.3 s, over the peak: steep tyre, slow car; flat tyre, fast
-  // car.
+  // By how much the reference moves, over the peak, while the lower wheel's speed is in a range.
   const auto swing = [](const rig::TyreParameters& tyre, double least_rad_s, double most_rad_s) {
     auto s = real_rig();
     s.plant->tyre = tyre;
@@ -185,4 +187,33 @@ TEST_CASE("Where the slip runs away within the brake's lag, nothing searches") {
   const double part = control::ControlOptions{}.adaptive_optimal.search_part;
   CHECK(swing({30.0, 12.0, 1.4}, 60.0, 120.0) > 1.5 * part);
   CHECK(swing({55.0, 38.0, 1.85}, 12.0, 25.0) < 0.3 * part);
+}
+
+TEST_CASE("The excess torque is the largest from which a brake of limited rate still ends at the wanted slip") {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  control::ProximateTorque loop{.mass_kg_m = 0.0758,
+                                .gain_per_s = 1e6,
+                                .near_per_s = 1e6,
+                                .near_m_s = 0.1,
+                                .swing_per_s = 20.37,
+                                .rate_limit_Nm_s = 100.0};
+  // With a rate limit: while the excess z falls to 0 at 100 N m/s, e_v moves by the whole error.
+  for (const double error : {0.01, 0.1, 1.0}) {
+    const double z = loop.excess_Nm(error, 1e3, 1.0);
+    CHECK_THAT(z * z / (2.0 * 100.0 * 0.0758), WithinRel(error, 1e-12));
+  }
+  // With the lag alone: the torque falls faster at first than the rate at its end, so the error is not used up.
+  loop.rate_limit_Nm_s = infinite;
+  const double hold = 3.0, error = 0.2;
+  const double z = loop.excess_Nm(error, hold, 1.0);
+  double moved = 0.0;
+  for (double torque = hold + z; torque > hold; torque -= 1e-6 * 20.37 * torque)
+    moved += 1e-6 * (torque - hold) / 0.0758;
+  CHECK(moved < error);
+  CHECK(moved > 0.5 * error);
+  // Near the target it is linear.
+  loop.gain_per_s = 60.0;
+  loop.near_per_s = 10.0;
+  CHECK_THAT(loop.excess_Nm(1e-6, hold, 1.0), WithinRel(10.0 * 0.0758 * 1e-6, 1e-4));
+  CHECK(loop.excess_Nm(0.0, hold, 1.0) == 0.0);
 }

@@ -1,18 +1,16 @@
-// The force from the lower wheel, the bank that learns the tyre's curve from it, and the loop's time-optimal limit.
+// The bank that learns the tyre's curve from slip and force.
 
 #include "control/friction_bank.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
 
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "catch.hpp"
-#include "control/adaptive_optimal_controller.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
@@ -22,29 +20,6 @@ namespace {
 
 constexpr double period_s = 1e-3;
 constexpr double delay_s = 8e-3;
-
-double force_at(double t) { return t < 0.05 ? 400.0 * t : 20.0 + 5.0 * std::sin(40.0 * (t - 0.05)); }
-
-/// Angle that the lower wheel turns in each period under `force_at`: the equation of motion in steps of a microsecond.
-class LowerWheel {
- public:
-  double omega_rad_s{170.0};
-  double next_rad() {
-    double angle = 0.0;
-    for (int i = 0; i < 1000; ++i) {
-      const double alpha =
-          (-w_.r2_m * force_at(time_s_ + 0.5e-6) - w_.d2_Nms_rad * omega_rad_s - w_.M20_Nm) / w_.J2_kg_m2;
-      angle += omega_rad_s * 1e-6 + 0.5 * alpha * 1e-12;
-      omega_rad_s += alpha * 1e-6;
-      time_s_ += 1e-6;
-    }
-    return angle;
-  }
-
- private:
-  rig::WheelParameters w_{};
-  double time_s_{0.0};
-};
 
 /// A tyre on a road, seen by the bank with the delays that it has in the controller.
 class Rolling {
@@ -119,40 +94,6 @@ TEST_CASE("Before braking the bank's curve is the mean of the magic formulas tha
     CAPTURE(slip);
     CHECK_THAT(bank.at(slip).N, WithinAbs(o.level0_N * sum / weights, 3e-4 * o.level0_N));
   }
-}
-
-TEST_CASE("The lower wheel's angle alone gives the tyre force, late by three known lags") {
-  const rig::WheelParameters wheels;
-  LowerWheel wheel;
-  control::LowerWheelForce force{wheels, 150.0};
-  control::ForceDelay<double> late, too_late;
-  force.reset(wheel.omega_rad_s);
-  double largest_error = 0.0, largest_shifted = 0.0, before = 0.0;
-  for (int n = 1; n <= 400; ++n) {
-    const double travel = wheel.next_rad();
-    force.update(period_s, travel, wheel.omega_rad_s);
-    const double now = force_at(n * period_s);
-    largest_error = std::max(largest_error, std::abs(force.force_N() - late(force.covered(), now)));
-    largest_shifted = std::max(largest_shifted, std::abs(force.force_N() - too_late(force.covered(), before)));
-    before = now;
-  }
-  CHECK(largest_error < 0.02);
-  CHECK(largest_shifted > 0.2);  // one cycle more would be seen
-}
-
-TEST_CASE("Cycles of unequal length do not change the force that the lower wheel gives") {
-  const rig::WheelParameters wheels;
-  control::LowerWheelForce force{wheels, 150.0};
-  const double force_N = 20.0;
-  double omega = 170.0;
-  force.reset(omega);
-  for (int n = 0; n < 400; ++n) {
-    const double dt_s = n % 2 == 0 ? 0.7e-3 : 1.3e-3;
-    const double alpha = (-wheels.r2_m * force_N - wheels.d2_Nms_rad * 170.0 - wheels.M20_Nm) / wheels.J2_kg_m2;
-    force.update(dt_s, omega * dt_s + 0.5 * alpha * dt_s * dt_s, 170.0);
-    omega += alpha * dt_s;
-  }
-  CHECK_THAT(force.force_N(), WithinRel(force_N, 1e-6));
 }
 
 TEST_CASE("The bank finds the peak of curves that are not in it, through a slip that is read wrong") {
@@ -266,22 +207,6 @@ TEST_CASE("The last braking helps before the peak is seen, and is forgotten wher
   }
 }
 
-TEST_CASE("Delayed speeds are as late as the force") {
-  control::DelayedSpeeds delayed;
-  control::ForceDelay<double> late;
-  const double q = 0.15;
-  // Speeds that rise in proportion to the time: the mean of an interval is that of its ends.
-  delayed.reset({.omega1_rad_s = 0.0, .omega2_rad_s = 0.0});
-  for (int n = 1; n <= 300; ++n) {
-    const double now = 0.4 * n, before = 0.4 * (n - 1);
-    delayed.update(q, period_s, 0.5 * (now + before) * period_s, (now + before) * period_s);
-    CAPTURE(n);
-    const double expected = late(q, now);
-    CHECK_THAT(delayed.speeds().omega1_rad_s, WithinAbs(expected, 1e-12 * now));
-    CHECK_THAT(delayed.speeds().omega2_rad_s, WithinAbs(2.0 * expected, 1e-12 * now));
-  }
-}
-
 TEST_CASE("A jump of friction moves the level within 40 ms and leaves the shape") {
   const rig::TyreParameters tyre{23.0, 28.0, 1.68};
   for (const double level : {0.5, 1.8}) {
@@ -325,7 +250,7 @@ TEST_CASE("Whatever the data say, the slip at no force stays near what was read 
     bank.reset({.slip = -read, .car_speed_m_s = 10.0, .force_N = 1.0});
     const double room = 0.01 + o.zero_error_m_s / 10.0 + o.zero_error_per_N;
     double least = 1.0, most = -1.0;
-    // A force that rises, then falls, and depends little on the slip: only a zero that wanders explains it.
+    // A force that does not depend on the slip, and falls by a step: only a zero that wanders explains it.
     for (int n = 0; n < 4000; ++n) {
       const double slip = 0.02 + 0.015 * std::sin(0.03 * n);
       const double force_N = n < 2000 ? 25.0 : 6.0;
@@ -411,33 +336,4 @@ TEST_CASE("Options of the bank out of range are refused") {
   CHECK_THROWS_AS(made({.share_per_s = 0.0}), std::invalid_argument);
   CHECK_THROWS_AS(made({}, 0.0), std::invalid_argument);
   CHECK_THROWS_AS(made({}, 1e3, 0.0), std::invalid_argument);
-}
-
-TEST_CASE("The excess torque is the largest from which a brake of limited rate still ends at the wanted slip") {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  control::ProximateTorque loop{.mass_kg_m = 0.0758,
-                                .gain_per_s = 1e6,
-                                .near_per_s = 1e6,
-                                .near_m_s = 0.1,
-                                .swing_per_s = 20.37,
-                                .rate_limit_Nm_s = 100.0};
-  // With a rate limit: while the excess z falls to 0 at 100 N m/s, e_v moves by the whole error.
-  for (const double error : {0.01, 0.1, 1.0}) {
-    const double z = loop.excess_Nm(error, 1e3, 1.0);
-    CHECK_THAT(z * z / (2.0 * 100.0 * 0.0758), WithinRel(error, 1e-12));
-  }
-  // With the lag alone: the torque falls faster at first than the rate at its end, so the error is not used up.
-  loop.rate_limit_Nm_s = infinite;
-  const double hold = 3.0, error = 0.2;
-  const double z = loop.excess_Nm(error, hold, 1.0);
-  double moved = 0.0;
-  for (double torque = hold + z; torque > hold; torque -= 1e-6 * 20.37 * torque)
-    moved += 1e-6 * (torque - hold) / 0.0758;
-  CHECK(moved < error);
-  CHECK(moved > 0.5 * error);
-  // Near the target it is linear.
-  loop.gain_per_s = 60.0;
-  loop.near_per_s = 10.0;
-  CHECK_THAT(loop.excess_Nm(1e-6, hold, 1.0), WithinRel(10.0 * 0.0758 * 1e-6, 1e-4));
-  CHECK(loop.excess_Nm(0.0, hold, 1.0) == 0.0);
 }
