@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""usage: nmpc_table.py --check|--write|--tune
+"""usage: nmpc_table.py --out FOLDER|--tune
 
 Brakes with NMPC on the posterior of `adaptive-optimal` (research/nmpc.py) in all cases of the benchmark, with the first seed, and
-with `adaptive-optimal` itself. Keeps the table of docs/benchmark.md between the lines <!-- nmpc --> and
-<!-- end -->, and more figures in docs/reference/nmpc.csv. Prints the processor time of a solve.
+with `adaptive-optimal` itself. Writes docs/benchmark.md with its table between the lines <!-- nmpc --> and <!-- end -->, and
+docs/reference/nmpc.csv with more figures, below FOLDER. Prints the processor time of a solve.
 
 --tune compares values of the free numbers on other cases: the plants from other speeds, and drawn and combined cases of another
 seed. Each number is moved alone, and stays where the score is least: the mean excess over the distance of `adaptive-optimal`, plus
@@ -11,6 +11,7 @@ a fifth of that of the worst twentieth, plus one per cent for 60 N m of torque v
 
 Needs casadi, a C compiler, and the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
+import argparse
 import dataclasses
 import functools
 import os
@@ -22,7 +23,7 @@ from collections.abc import Callable
 os.environ['OMP_NUM_THREADS'] = '1'
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
 import numpy as np  # noqa: E402
-from marked_tables import csv_text, keep  # noqa: E402
+from marked_tables import csv_text, replaced  # noqa: E402
 from nmpc import Nmpc, Tuning, compiled, operations  # noqa: E402
 
 import abs_hil  # noqa: E402
@@ -150,15 +151,20 @@ def tune():
 
 
 def main():
-    if sys.argv[1:] == ['--tune']:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument('--out', type=pathlib.Path, metavar='FOLDER')
+    what.add_argument('--tune', action='store_true')
+    o = parser.parse_args()
+    if o.tune:
         return tune()
-    if sys.argv[1:] not in (['--check'], ['--write']):
-        print(__doc__, file=sys.stderr)
-        return 2
-    status = keep(sys.argv[1], [('benchmark.md', 'nmpc', table), ('reference/nmpc.csv', None, every)])
+    for file, text in (('benchmark.md', replaced('benchmark.md', 'nmpc', table())), ('reference/nmpc.csv', every())):
+        path = o.out / 'docs' / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
     made = judged()['all'][2]
     print(f'a solve takes {1e3 * sum(one.solving_s for one in made) / sum(one.solves for one in made):.2f} ms of processor time')
-    return status
+    return 0
 
 
 if __name__ == '__main__':

@@ -35,6 +35,17 @@ def listing(steps):
     return '\n'.join(lines)
 
 
+def same_sums():
+    """Settings with which all processors that know AVX2 add in the same order: where one has AVX-512, OpenBLAS and numpy take
+    more lanes, and so round in another way."""
+    cpus = pathlib.Path('/proc/cpuinfo')
+    flags = cpus.read_text(encoding='utf-8') if cpus.exists() else ''
+    settings = {'OPENBLAS_CORETYPE': 'Haswell'} if ' avx2' in flags else {}
+    if ' avx512f' in flags:
+        settings['NPY_DISABLE_CPU_FEATURES'] = 'AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL'
+    return settings
+
+
 @dataclasses.dataclass
 class Running:
     step: Step
@@ -58,7 +69,7 @@ class Reproduction:
         self.done, self.running = {}, []
         self.environment = {**os.environ, 'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1', 'PYTHONDONTWRITEBYTECODE': '1',
                             'ABS_BIN': str(place.build / 'bin'),
-                            'PYTHONPATH': str(place.build / 'share' / 'abs_hil' / 'python')}
+                            'PYTHONPATH': str(place.build / 'share' / 'abs_hil' / 'python'), **same_sums()}
         for folder in ('state', 'log'):
             (place.state / folder).mkdir(parents=True, exist_ok=True)
 
