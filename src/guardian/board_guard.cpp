@@ -20,6 +20,8 @@ constexpr std::int64_t quick_pause_ns = 1'000'000;
 constexpr std::int64_t slow_pause_ns = 10'000'000;
 constexpr std::int64_t last_tries_ns = 1'000'000'000;
 constexpr int looks_to_believe = 2;
+/// So long a board may show nothing, as after a lost datagram, before its outputs count as given to the guard.
+constexpr std::int64_t blind_most_ns = 100'000'000;
 /// A holder whose board shows duties again and again drives it without being watched. A single one may be another's.
 constexpr int foreign_duty_weighs = 2;
 constexpr int foreign_duties_most = 12;
@@ -128,6 +130,7 @@ void BoardGuard::cover(std::int64_t timeout_ns) noexcept {
   watchdog_.emplace(timeout_ns, look_period_ns_, parts_.board.owner_needs_ns());
   report_ = {};
   looks_until_believed_ = looks_to_believe;
+  blind_since_ns_ = -1;
   foreign_duties_ = 0;
   now_ns_ = last_look_ns_ = parts_.clock.now_ns();
   suspensions_.begin(parts_.clock);
@@ -254,24 +257,32 @@ void BoardGuard::watch() noexcept {
   if (released && parts_.board.works_beside_owner()) static_cast<void>(believe_once_seen());
 }
 
-/// Looks whether the outputs are zero, as the run says. Returns true once that was seen often enough.
+/// Looks whether the outputs are zero, as the run says. Returns true once that was seen often enough. A run whose board
+/// shows an output is ended. Of a board that shows nothing the guard takes over the outputs and lets the run end.
 bool BoardGuard::believe_once_seen() noexcept {
   const bool must_wait_for_owner = !gone_ && !parts_.board.works_beside_owner();
   const bool rests = pages_->run().stage.load(std::memory_order_relaxed) == Stage::resting;
   if (must_wait_for_owner && rests) return true;  // an access would disturb its driver
   const bool first = looks_until_believed_ == looks_to_believe;
-  if (!first && now_ns_ < next_keep_ns_) return false;
+  if ((!first || blind_since_ns_ >= 0) && now_ns_ < next_keep_ns_) return false;
   if (first) board_ = {driver::IoError::not_active};  // make it safe, then look
   const bool only_looks = board_.ok();  // zeros that the guard writes itself prove nothing but that they can be written
   look_at_board();
-  if (board_.ok() && (first || only_looks)) looks_until_believed_ = std::max(0, looks_until_believed_ - 1);
-  if (!board_.ok() && must_wait_for_owner) looks_until_believed_ = 0;  // its owner has it still: looked at afterwards
-  if ((first && !board_.ok() && !must_wait_for_owner) || foreign_duties_ >= foreign_duties_most) {
+  next_ns_ = std::min(next_ns_, next_keep_ns_);
+  const bool shows_output =
+      board_.error == driver::IoError::read_back_mismatch || board_.error == driver::IoError::foreign_writer;
+  const bool blind = !board_.ok() && !shows_output && !must_wait_for_owner;
+  if (!blind) blind_since_ns_ = -1;
+  if (blind && blind_since_ns_ < 0) blind_since_ns_ = now_ns_;
+  const bool blind_too_long = blind && now_ns_ - blind_since_ns_ >= blind_most_ns;
+  const bool lies = (first && shows_output && !must_wait_for_owner) || foreign_duties_ >= foreign_duties_most;
+  if (lies || blind_too_long) {
     report_.reason = Reason::safe_state_unverified;
-    begin_to_act(false);
+    begin_to_act(!lies);
     return false;
   }
-  next_ns_ = std::min(next_ns_, next_keep_ns_);
+  if (board_.ok() && (first || only_looks)) looks_until_believed_ = std::max(0, looks_until_believed_ - 1);
+  if (!board_.ok() && must_wait_for_owner) looks_until_believed_ = 0;  // its owner has it still: looked at afterwards
   return looks_until_believed_ == 0;
 }
 
@@ -292,6 +303,7 @@ void BoardGuard::begin_to_act(bool writes_zeros_only) noexcept {
   report_.acted = true;
   report_.controller_lives = writes_zeros_only && !gone_;
   report_.ended_controller = !report_.controller_lives && !gone_;
+  if (report_.controller_lives) pages_->guard().taken_back_for.store(report_.reason, std::memory_order_relaxed);
   if (parts_.released != nullptr) parts_.released->store(false, std::memory_order_relaxed);
   if (report_.ended_controller) parts_.processes.end(handle_);
   safe_ = false;

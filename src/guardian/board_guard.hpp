@@ -119,8 +119,9 @@ class BoardGuard {
   bool safe_{false};
   std::int64_t next_keep_ns_{0};
   std::int64_t looked_ns_{-1};
-  int looks_until_believed_{0};  ///< of a run that says that its outputs are safe
-  int foreign_duties_{0};        ///< grows with each look that finds an output on
+  int looks_until_believed_{0};      ///< of a run that says that its outputs are safe
+  std::int64_t blind_since_ns_{-1};  ///< since then those looks had no answer; < 0: the last had one
+  int foreign_duties_{0};            ///< grows with each look that finds an output on
 
   // The lease.
   std::uint32_t lease_{0};  ///< 0: nobody has it

@@ -221,10 +221,13 @@ GuardEnd GuardianProcess::end(Stage stage) noexcept {
   if (pid_ == 0) return GuardEnd::none;
   const bool handed_over = close_page(stage);
   const bool ended = has_ended(process_.get(), ends_within_ms);
+  // A guardian that has taken the outputs over is not hung: it cannot see them yet.
+  const bool acts =
+      pages().guard().taken_back_for.load(std::memory_order_relaxed) == rig::Reason::safe_state_unverified;
+  const bool insists = handed_over || acts;
   GuardEnd how = GuardEnd::insisting;
-  if (!ended && !handed_over)
-    ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe
-  if (ended || !handed_over) {
+  if (!ended && !insists) ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe
+  if (ended || !insists) {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }

@@ -66,8 +66,12 @@ std::vector<std::filesystem::path> write_flight_record(const std::filesystem::pa
                                                        const std::string& channel_prefix,
                                                        std::vector<std::string>& problems) {
   std::vector<std::filesystem::path> written;
+  std::filesystem::path free = prefix;  // the run and its guardian may both have something to tell
+  for (int number = 2; std::filesystem::exists(free.string() + ".txt"); ++number) {
+    free = prefix.string() + '-' + std::to_string(number);
+  }
   const auto attempt = [&](const char* extension, auto&& write) {
-    std::filesystem::path path = prefix;
+    std::filesystem::path path = free;
     path += extension;
     try {
       write(path);

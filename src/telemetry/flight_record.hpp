@@ -23,10 +23,10 @@ struct FlightRecord {
 inline constexpr std::string_view flight_csv_extra_header =
     ",cycle,stamp_ns,supply_V,temperature_C,trip_flags,reason,reason_value,wakeup_latency_us,cycle_us";
 
-/// Writes `PREFIX.csv` (a row a cycle, `distance_m` NaN, with more columns than a run's CSV, the
-/// controller's own signals last), `PREFIX.lcmlog` (the
-/// messages of a run, then an ABS_EVENT of kind "fault" with the reason) and `PREFIX.txt` (reason and account). A
-/// failure of one file does not stop the others. Returns the written files. Appends the problems to `problems`.
+/// Writes `PREFIX.csv` (a row a cycle, `distance_m` NaN, with more columns than a run's CSV, the controller's own
+/// signals last), `PREFIX.lcmlog` (the messages of a run, then an ABS_EVENT of kind "fault" with the reason) and
+/// `PREFIX.txt` (reason and account). Beside an older record they are called `PREFIX-2`, and so on. A failure of one
+/// file does not stop the others. Returns the written files. Appends the problems to `problems`.
 std::vector<std::filesystem::path> write_flight_record(const std::filesystem::path& prefix, const FlightRecord& record,
                                                        const ExperimentInfo& experiment,
                                                        const std::string& channel_prefix,

@@ -82,14 +82,40 @@ TEST_CASE("a silent controller is ended, and seen to have ended, before anything
   CHECK(report.controller_gone_ns <= report.first_written_ns);
 }
 
-TEST_CASE("a run whose board cannot be looked at is not believed") {
+TEST_CASE("a lost answer of the board ends no run") {
   Post post;
   post.stage_at_ns = then_ns;
   post.at_then = [&post] { post.board.fails_first = 3; };
+  CHECK(post.run().reason == Reason::none);
+  CHECK(post.processes.lives(run_process));
+  CHECK(post.guard_page().ended_safe.load());
+  CHECK(post.clock.now_ns() - then_ns <= 60 * ms);
+}
+
+TEST_CASE("the guard takes over the outputs of a board that shows nothing for 100 ms, and lets the run end") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  post.at_then = [&post] { post.board.fails_first = 100; };
+  const GuardianReport report = post.run();
+  CHECK(report.reason == Reason::safe_state_unverified);
+  CHECK_FALSE(report.ended_controller);
+  CHECK(post.processes.lives(run_process));
+  CHECK(post.guard_page().taken_back_for.load() == Reason::safe_state_unverified);
+  CHECK(report.verified);
+  CHECK(report.first_written_ns - then_ns >= 100 * ms);
+  CHECK(report.first_written_ns - then_ns <= 120 * ms);
+}
+
+TEST_CASE("a run that drives on behind a board that shows nothing is ended once it shows an output") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  post.lies = true;
+  post.at_then = [&post] { post.board.fails_first = GENERATE(3, 100); };
   const GuardianReport report = post.run();
   CHECK(report.reason == Reason::safe_state_unverified);
   CHECK(report.ended_controller);
   CHECK(report.verified);
+  CHECK(post.board.duty == 0.0);
 }
 
 TEST_CASE("a run that rests with a board that others reach is looked at like any other") {

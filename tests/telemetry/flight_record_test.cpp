@@ -76,6 +76,20 @@ TEST_CASE("the flight record has the controller's own signals, by their names") 
   CHECK_THAT(second, Catch::Matchers::EndsWith(",0.25,-3"));
 }
 
+TEST_CASE("the record of a guardian does not replace that of its run") {
+  const test::TemporaryFolder folder;
+  std::vector<std::string> problems;
+  for (const char* account : {"of the run\n", "of the guardian\n"}) {
+    CHECK(
+        write_flight_record(folder.path / "flight", {.records = {}, .account = account}, {}, "ABS_", problems).size() ==
+        3);
+  }
+  CHECK(problems.empty());
+  CHECK_THAT(content(folder.path / "flight.txt"), Catch::Matchers::Contains("of the run"));
+  CHECK_THAT(content(folder.path / "flight-2.txt"), Catch::Matchers::Contains("of the guardian"));
+  CHECK(std::filesystem::exists(folder.path / "flight-2.lcmlog"));
+}
+
 TEST_CASE("each further column of the flight record holds its own quantity") {
   const test::TemporaryFolder folder;
   rig::CycleRecord record{};
