@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <initializer_list>
+#include <map>
 #include <tuple>
 
 #include "driver/board_kit.hpp"
@@ -149,6 +150,7 @@ class Reader {
         refuse(formatted("it has %u %s%s, the rig needs %u", has, known.name, has == 1 ? "" : "s", known.least));
       }
     }
+    require_registers_apart();
     if (board_.port.instances != board_.ports) {
       refuse(formatted("it has %u I/O port instances and %u ports", board_.port.instances, board_.ports));
     }
@@ -198,6 +200,24 @@ class Reader {
     module.clock_Hz = clock == 1 ? board_.clock_low_Hz : board_.clock_high_Hz;
   }
 
+  void require_registers_apart() const {
+    std::map<std::uint16_t, const char*> owners;
+    for (const Known& known : known_modules()) {
+      const Module& module = board_.*known.place;
+      for (unsigned reg = 0; reg < known.registers; ++reg) {
+        const unsigned instances = (known.multiple >> reg & 1U) != 0 ? module.instances : 1;
+        for (unsigned instance = 0; instance < instances; ++instance) {
+          const std::uint16_t address = module.address(reg, instance);
+          const auto [owner, is_new] = owners.emplace(address, known.name);
+          if (!is_new) {
+            refuse(
+                formatted("its %s and its %s module both have the register 0x%x", owner->second, known.name, address));
+          }
+        }
+      }
+    }
+  }
+
   void read_pins(std::uint32_t place) {
     constexpr unsigned at_once = 64;
     const unsigned pins = board_.ports * board_.port_width;
@@ -234,6 +254,7 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
     refuse(formatted("driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance, module->instances - 1));
   }
   UsedPins used;
+  PortWords counted{};
   const auto word = [&](PortWords& words, std::size_t pin) -> std::uint32_t& { return words[pin / board.port_width]; };
   const auto bit = [&](std::size_t pin) { return 1U << (pin % board.port_width); };
   const auto claim = [&](const char* key, std::int32_t number) {
@@ -242,6 +263,10 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
       refuse(formatted("driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, number, board.pins.size() - 1));
     }
     if ((word(used.outputs, pin) & bit(pin)) != 0) refuse(formatted("I/O pin %d has two uses", number));
+    if ((word(counted, pin) & bit(pin)) != 0) {
+      refuse(formatted("driver.hm2.%s = %d: this I/O pin is an input of an encoder's counter; give a free one", key,
+                       number));
+    }
     word(used.outputs, pin) |= bit(pin);
     if (options.active_low) word(used.inverted, pin) |= bit(pin);
   };
@@ -255,6 +280,7 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
     const bool counts =
         pin.tag == tag::counter && (pin.unit == options.lower_channel || pin.unit == options.upper_channel);
     if (drives || brakes || counts) word(used.modules, i) |= bit(i);
+    if (counts) word(counted, i) |= bit(i);
     if (drives) drive_pin = static_cast<std::int32_t>(i);
     if (brakes) brake_pin = static_cast<std::int32_t>(i);
   }

@@ -24,6 +24,8 @@ constexpr std::uint32_t unbuffered_12_bit = 0x03;
 constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
 constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
 constexpr std::uint32_t filter_at_25_MHz = 2;
+constexpr std::uint16_t usual_direction =
+    0x1100;  // register 1 of the ports at base 0x1000, in all firmware known to us
 
 std::uint32_t pwm_rate(const Hm2Options& options, const Board& board) {
   constexpr double rate_steps = 65536.0;
@@ -67,6 +69,7 @@ void Hm2Driver::do_configure() {
   link_.reset();
   link_ = std::make_unique<RecordedLink>(open_link_());
   read_number_ = static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 16U;
+  const bool was_on = outputs_at_usual_place();
   board_ = read_board(*link_, options_.address, read_number_);
   // A board in real time is not asked: what hardware answers there is not known.
   if (lock_step_) require_lock_step("the hm2 board at " + options_.address, true, waits_for_time());
@@ -94,11 +97,20 @@ void Hm2Driver::do_configure() {
   stamp_tick_ns_ = (stamps_at_2_MHz + 2) * static_cast<double>(rig::ns_per_s) / board_.counter.clock_Hz;
   CycleAnswer answer;
   if (!ask_board(answer)) refuse("the hm2 board went silent");
-  if (!all_off(answer.direction)) {
+  if (!all_off(answer.direction) || (was_on && wire_.direction == usual_direction)) {
     refuse("outputs of the hm2 board at " + options_.address +
            " are on (its DDR is not 0): another program drives it. End that one, or make the board safe with abs_hil "
            "safe --set driver.kind=hm2");
   }
+}
+
+/// A program that drives the board ends its outputs once it notices another one. So the first datagram looks at them.
+bool Hm2Driver::outputs_at_usual_place() noexcept {
+  constexpr unsigned ports = 2;
+  Packet packet;
+  const std::size_t where = packet.read(space::hostmot2, usual_direction, ports);
+  std::array<std::uint8_t, 4 * ports> answer{};
+  return ask(*link_, packet, answer, read_number_) && (word32(answer, where) | word32(answer, where + 4)) != 0;
 }
 
 bool Hm2Driver::waits_for_time() {

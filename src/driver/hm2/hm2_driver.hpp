@@ -100,6 +100,7 @@ class Hm2Driver final : public BoardDriver {
   }
   [[nodiscard]] bool all_off(const PortWords& direction) const noexcept;
   [[nodiscard]] bool set_up_outputs(std::string& why);
+  [[nodiscard]] bool outputs_at_usual_place() noexcept;
   /// True for an emulator that waits for its time; `emulated_ns_` becomes that.
   [[nodiscard]] bool waits_for_time();
   IoResult judge(const CycleAnswer& answer) noexcept;

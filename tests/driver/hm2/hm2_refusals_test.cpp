@@ -37,6 +37,16 @@ TEST_CASE("A board whose outputs are on is another program's: refused") {
   CHECK(board.writes == writes);
 }
 
+TEST_CASE("A board whose driving program lets go at the first datagram of another one is refused all the same") {
+  RegisterBoard board;
+  board.handle(std::array<std::uint8_t, 8>{0x81, 0xC2, 0x00, 0x11, 2, 0, 0, 0});
+  board.bites_after = 2;
+  Cable cable(board);
+  Hm2Driver driver({}, cable.opener());
+  CHECK_THROWS_WITH(driver.configure(), Contains("another program drives it"));
+  CHECK(board.ddr()[0] == 0);
+}
+
 TEST_CASE("A board that describes what cannot be, or what is not known, is refused with the fact") {
   struct Lie {
     std::uint16_t address;
@@ -67,6 +77,9 @@ TEST_CASE("A board that describes what cannot be, or what is not known, is refus
                          Lie{0x464, 0x02070006, "names clock 7"},
                          Lie{0x464, 0x01020006, "it has 1 PWM, the rig needs 2"},
                          Lie{0x468, 0x0005FC00, "PWM module has base 0xfc00"},
+                         Lie{0x45C, 0x00051000, "I/O port and its quadrature counter module both have the register 0x1000"},
+                         Lie{0x468, 0x00050C00, "watchdog and its PWM module both have the register 0xc00"},
+                         Lie{0x468, 0x00050E00, "watchdog and its PWM module both have the register 0xe00"},
                          Lie{0x46C, 0xFF, "bitmap 0xff"},
                          Lie{0x470, 0x02020006, "PWM module twice"},
                          Lie{0x600, 0x05000000, "pin 0 has the primary function 5"},
@@ -96,6 +109,8 @@ TEST_CASE("Options that the board cannot have are refused, naming the key") {
   CHECK_THAT(said({.brake_pin = 3}), Contains("driver.hm2.brake_pin = 3, but the board has that PWM at I/O pin 18"));
   CHECK_THAT(said({.relay_pin = 40}), Contains("driver.hm2.relay_pin = 40: the board has the I/O pins 0 to 33"));
   CHECK_THAT(said({.relay_pin = 1}), Contains("I/O pin 1 has two uses"));
+  CHECK_THAT(said({.relay_pin = 13}), Contains("driver.hm2.relay_pin = 13: this I/O pin is an input of an encoder's"));
+  CHECK_THAT(said({.enable_pin = 31}), Contains("driver.hm2.enable_pin = 31: this I/O pin is an input"));
   CHECK(said({.drive_pin = -1, .brake_pin = -1}) == "accepted");
   RegisterBoard board;
   Cable cable(board);

@@ -83,6 +83,7 @@ class RegisterBoard final : public emulator::RigBehind {
         if ((word & 0x80U) != 0) address = static_cast<std::uint16_t>(address + width);
       }
     }
+    if (received.all == bites_after) bite();
     return answer;
   }
   void bite() {
@@ -115,6 +116,7 @@ class RegisterBoard final : public emulator::RigBehind {
   std::array<std::uint32_t, 2> control{};  ///< bits that the counters report beside what was written
   std::uint32_t broken_pins{0};            ///< pins of port 1 that never become outputs
   int time_jump_counts{0};
+  std::uint16_t bites_after{0};  ///< so many packets: the program that drove it has ended its outputs; 0: never
   std::array<std::uint8_t, 0x20> info_{};
 
  private:
