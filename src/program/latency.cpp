@@ -1,7 +1,11 @@
-// `abs_hil latency`: the real-time cycle on the simulated rig, and a verdict on this computer's timing.
+// `abs_hil latency`: the real-time cycle, and a verdict on this computer's timing. On the simulated rig it accelerates
+// and brakes. On a board it only reads and writes zeros, under the guard and the conditions of a run.
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -11,6 +15,8 @@
 #include "diagnosis/latency_verdict.hpp"
 #include "experiment/sequence.hpp"
 #include "files/result_file.hpp"
+#include "guardian/guarding.hpp"
+#include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 
@@ -62,24 +68,42 @@ config::Plan timing_load(double duration_s) {
   return plan;
 }
 
+/// A board is read and gets zeros. No wheel turns.
+config::Plan idle(double duration_s) {
+  config::Plan plan;
+  plan.phases.push_back(timed(rig::Phase::idle, duration_s));
+  return plan;
+}
+
 int latency(const LatencyOptions& options) {
-  config::Settings s = config::merged_settings(options.sources);
-  s.experiment.start_speed_rad_s = start_speed_rad_s;
+  RunRequest request;
+  static_cast<config::Configuration&>(request) = config::merge(options.sources);
+  config::Settings& s = request.settings;
+  const bool on_rig = s.on_rig();
+  if (!on_rig) s.experiment.start_speed_rad_s = start_speed_rad_s;
   // Gaps in the simulation are what this command measures; they must not end it.
   constexpr double any_gap_s = 3600.0;
-  if (s.backend == "sim") s.realtime.overruns.cycle_gap_max_s = any_gap_s;
+  if (!on_rig) s.realtime.overruns.cycle_gap_max_s = any_gap_s;
   std::optional<files::ResultFile> histogram;
   try {
     if (options.histogram_file) histogram.emplace(*options.histogram_file, "histogram");
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
-  const run::Prepared prepared(s, timing_load(options.duration_s));
-  run::Run run(prepared, {.real_time = true});
+  const std::unique_ptr<guardian::GuardianLease> lease = guardian::ask_for_lease(s, false);
+  const run::Prepared prepared(s, on_rig ? idle(options.duration_s) : timing_load(options.duration_s));
+  run::Run run(prepared, {.real_time = true, .overruns = overruns_of(s, false)});
+  if (on_rig) require_resources(run, lease != nullptr);
+  std::optional<RunMonitor> monitor;
+  if (on_rig) monitor.emplace(request, lease.get(), std::filesystem::path(), run.names()).attach(run);
   if (options.second_offset_us) run.align_to_second(std::int64_t{*options.second_offset_us} * 1000);
   note_signals();
   const diagnosis::MachineFacts facts = diagnosis::read_machine_facts();
-  const run::RunOutcome outcome = run.go(signalled);
+  const auto poll = [&] {
+    const rig::Reason guard = monitor ? monitor->poll() : rig::Reason::none;
+    return guard != rig::Reason::none ? guard : signalled();
+  };
+  const run::RunOutcome outcome = on_rig ? run.go_guarded(poll) : run.go(poll);
   if (!outcome.ran) throw driver::Unavailable(realtime_refusal(outcome.realtime));
 
   const runtime::CycleStatistics& statistics = run.executive().statistics();
@@ -94,6 +118,12 @@ int latency(const LatencyOptions& options) {
   if (!options.json) {
     for (const std::string& line : run.driver().tally()) fmt::print("{}\n", line);
   }
+  if (monitor) {
+    run.release_driver();  // the guard reads the board back before it believes that the run is over
+    monitor->end();
+  }
+  if (!outcome.completed())
+    spdlog::error("ended early: {}", rig::reason_with_value(outcome.reason, outcome.reason_value));
   return status_of(outcome);
 }
 
@@ -101,6 +131,7 @@ int latency(const LatencyOptions& options) {
 
 Action add_latency(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<LatencyOptions>();
+  add_backend_option(parser, o->sources);
   add_configuration_options(parser, o->sources);
   add_timing_options(parser, o->sources, o->histogram_file);
   parser.add({.names = "--duration",

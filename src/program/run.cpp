@@ -94,9 +94,6 @@ std::string realtime_refusal(const runtime::RealtimeReport& report) {
          report.shortcomings();
 }
 
-namespace {
-
-/// Without a limit of its own, the cycle's longest gap is that at which the guardian would act.
 runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time) {
   runtime::OverrunOptions overruns = s.realtime.overruns;
   if (overruns.cycle_gap_max_s == 0.0 && guardian::needs_guardian(s, virtual_time)) {
@@ -105,6 +102,8 @@ runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time
   }
   return overruns;
 }
+
+namespace {
 
 /// Checks in advance, as far as possible, that a guardian can start.
 void require_own_guardian(const driver::DriverOptions& board) {
@@ -116,8 +115,8 @@ void require_own_guardian(const driver::DriverOptions& board) {
       ": abs_hil needs its guardian to drive a rig; install abs_guardian in the folder of abs_hil");
 }
 
-/// Checks the required resources before the run's files are opened, so that a failure leaves an earlier run's files
-/// unchanged. Throws driver::Unavailable. The run itself obtains the resources again.
+}  // namespace
+
 void require_resources(run::Run& run, bool has_lease) {
   run.driver().configure();
   const config::Settings& s = run.settings();
@@ -132,6 +131,8 @@ void require_resources(run::Run& run, bool has_lease) {
   std::jthread([&] { report = runtime::RealtimeScope(s.realtime).report(); }).join();
   if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
 }
+
+namespace {
 
 /// Writes the run's files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
@@ -150,7 +151,8 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
     for (const std::string& line : run.driver().traffic()) account += '\n' + line;
     run_monitor.write_record(request, outcome.reason, outcome.reason_value, account);
   }
-  const std::vector<std::string> unwritten = outputs.write(summary, environment(request.command_line, run, outcome));
+  const std::vector<std::string> unwritten =
+      outputs.write(summary, environment(request.command_line, run, outcome), lost.empty());
   if (!request.in_series) {
     std::string text = analysis::to_text(summary);
     if (const auto& folder = outputs.folder()) {

@@ -70,6 +70,11 @@ int run_series(const RunOptions& options, const RunRequest& base);
 [[nodiscard]] int status_of(const run::RunOutcome& outcome);
 /// The message for a run that requires real time and did not start.
 [[nodiscard]] std::string realtime_refusal(const runtime::RealtimeReport& report);
+/// Without a limit of its own, the cycle's longest gap is that at which the guardian would act.
+[[nodiscard]] runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time);
+/// Configures the board and checks all else that a run needs, before the run's files are opened: a failure leaves an
+/// earlier run's files unchanged. The run itself obtains the resources again. Throws driver::Unavailable.
+void require_resources(run::Run& run, bool has_lease);
 
 // The command line's options of a run, as rows. Subcommands take those that they understand.
 

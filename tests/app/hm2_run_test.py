@@ -1,6 +1,7 @@
 """The paper's experiment through driver.kind=hm2, against the emulated 7I92T in another process: in lock-step it agrees with
 the simulator; in real time the board's watchdog ends what nobody else can. Outcomes and the board's own clock are asserted,
 never this computer's timing."""
+import json
 import os
 import pathlib
 import re
@@ -99,6 +100,18 @@ class Hm2Run(EmulatorTest):
         for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
             self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
         self.assertEqual(board.wire(), SAFE)
+
+    def test_latency_measures_the_wire_of_a_board_that_gets_only_zeros(self):
+        board = self.board()
+        result = self.run_program('latency', '--backend', 'rig', '--rt', 'off', '--duration', '1', '--json', '--set',
+                                  'driver.kind=hm2', '--set', f'driver.hm2.address={board.address}', '--set',
+                                  'guardian.timeout_ms=1000', '--set', 'realtime.cycle_gap_max_s=1')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        wire = json.loads(result.stdout)['wire_us']
+        self.assertGreater(wire['answers'], 900)
+        self.assertGreater(wire['mean'], 0.0)
+        self.assertEqual(board.wire(), SAFE)
+        self.assertFalse([line for line in board.lines if 'outputs on' in line])
 
     def test_faults_of_the_board_end_a_run_with_their_reasons(self):
         for command, words in self.FAULTS:
