@@ -8,6 +8,8 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -64,7 +66,48 @@ int own_output(const struct stat& facts) {
   return -1;
 }
 
+/// The files that this process reads, and those that it has open as results, by their canonical paths.
+struct KnownFiles {
+  std::mutex mutex{};
+  std::set<fs::path> inputs{};
+  std::set<fs::path> results{};
+};
+KnownFiles& known_files() {
+  static KnownFiles known;
+  return known;
+}
+
+fs::path place_of(const fs::path& path) {
+  std::error_code error;
+  const fs::path found = fs::weakly_canonical(fs::absolute(path, error), error);
+  return error ? path : found;
+}
+
+/// The returned object gives the place free again.
+std::shared_ptr<void> claim(const std::string& kind, const fs::path& path, const fs::path& target) {
+  const fs::path place = place_of(target);
+  const std::scoped_lock lock(known_files().mutex);
+  const auto& inputs = known_files().inputs;
+  if (inputs.contains(place) || inputs.contains(place.parent_path())) {
+    throw FileError(kind, path, "this command reads it; give another file", EEXIST);
+  }
+  if (!known_files().results.insert(place).second) {
+    throw FileError(kind, path, "another result goes into the same file; give each its own", EEXIST);
+  }
+  return {nullptr, [place](void*) {
+            const std::scoped_lock again(known_files().mutex);
+            known_files().results.erase(place);
+          }};
+}
+
 }  // namespace
+
+void note_input(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error) && !fs::is_directory(path, error)) return;
+  const std::scoped_lock lock(known_files().mutex);
+  known_files().inputs.insert(place_of(path));
+}
 
 FileError::FileError(std::string_view kind, const fs::path& path, int error_number)
     : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
@@ -77,6 +120,7 @@ ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_fol
     : path_(std::move(path)), kind_(std::move(kind)) {
   buffer_.reserve(buffer_bytes);
   open_target(path_, 0);
+  if (!target_.empty()) claim_ = claim(kind_, path_, target_);
   if (file_ < 0) open_part(part_folder);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -28,7 +29,8 @@ class FileError : public std::runtime_error {
 ///
 /// It replaces regular files only. A symbolic link stays, and the file that it names is replaced. A pipe, a terminal or
 /// another character device (/dev/stdout, /dev/null) receives the bytes as they come. A folder, a block device, a
-/// socket and a pipe without a reader are refused. Not real-time safe. All members throw FileError.
+/// socket and a pipe without a reader are refused, and so is a file that this process reads (note_input) or has open as
+/// another result. Not real-time safe. All members throw FileError.
 class ResultFile {
  public:
   /// @param kind  for messages, as "CSV file"
@@ -65,10 +67,14 @@ class ResultFile {
   std::string kind_;
   std::filesystem::path target_{};  ///< behind links; empty for a stream
   std::filesystem::path part_{};    ///< empty for a stream and once it stands in its place
+  std::shared_ptr<void> claim_{};   ///< this process' only result there
   std::string buffer_{};
   unsigned mode_{0};  ///< of the older file; 0: there is none
   int file_{-1};
 };
+
+/// No result of this process may replace this file, or a file of this folder: a command reads it.
+void note_input(const std::filesystem::path& path);
 
 /// Writes the whole file at once.
 void write_result(const std::filesystem::path& path, const std::string& kind, std::string_view bytes,

@@ -1,7 +1,11 @@
 // From the options of a run as typed to the run: what the merge of the configuration does not know.
 #include "program/command_line.hpp"
 
+#include <filesystem>
+#include <system_error>
+
 #include "config/config_error.hpp"
+#include "files/result_file.hpp"
 #include "program/questions.hpp"
 
 namespace abs_hil::program {
@@ -24,6 +28,13 @@ void check_start(const RunRequest& request) {
 
 }  // namespace
 
+void keep_inputs(const config::Sources& sources) {
+  for (const auto* file : {&sources.config_file, &sources.plant, &sources.model, &sources.experiment}) {
+    std::error_code error;
+    if (file->has_value() && std::filesystem::is_regular_file(**file, error)) files::note_input(**file);
+  }
+}
+
 RunRequest merge(const RunOptions& options) {
   if (options.virtual_time && options.outputs.histogram_file) {
     throw config::ConfigError(
@@ -33,6 +44,7 @@ RunRequest merge(const RunOptions& options) {
   sources.prior_file = options.outputs.prior_file;
   const bool by_itself = options.backend != "rig" && (options.virtual_time || !at_terminal());
   sources.answered_by = by_itself ? experiment::answers_itself : experiment::answers_person;
+  keep_inputs(sources);
   RunRequest request{config::merge(sources), options.outputs, options.virtual_time};
   if (request.settings.experiment.wait_for_start) check_start(request);
   return request;

@@ -43,6 +43,9 @@ struct RunRequest : config::Configuration {
   std::function<void()> stop_was_sent{};
 };
 
+/// No result of this process may replace a file that these name.
+void keep_inputs(const config::Sources& sources);
+
 /// The options as a run. A person answers its questions on a rig or at a terminal. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 

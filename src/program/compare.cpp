@@ -8,6 +8,7 @@
 
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
+#include "program/command_line.hpp"
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
@@ -79,6 +80,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
   refuse_number(options.runs_file);
   config::Sources sources = options.sources;
   sources.defaults.emplace_back(study::start_speed_default);
+  keep_inputs(sources);
   const config::Configuration merged = config::merge(sources);
   const config::Settings& s = merged.settings;
   const study::Study study(

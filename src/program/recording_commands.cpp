@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "config/config_error.hpp"
+#include "files/result_file.hpp"
 #include "program/subcommands.hpp"
 #include "replay/recorded_run.hpp"
 #include "replay/rerun.hpp"
@@ -20,6 +21,7 @@ namespace {
 std::string log_in(const std::string& recording) try {
   const std::filesystem::path path(recording);
   std::error_code error;
+  files::note_input(path);
   if (!std::filesystem::is_directory(path, error)) return recording;
   run_folder::check_seal(path);
   return (path / run_folder::file::log).string();
@@ -63,13 +65,18 @@ int replay_run(const ReplayCommand& command) {
     note(run.cut);
     if (command.check) return check_again(run);
     const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
+    std::optional<telemetry::CsvSink> csv;
+    try {
+      if (command.csv_file) csv.emplace(*command.csv_file, 0, replay::names_of(run, settings));
+    } catch (const files::FileError& error) {
+      throw config::ConfigError(error.what());
+    }
     const std::vector<replay::RerunCycle> rerun =
         replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
     fmt::print("{}", replay::report(run, settings, rerun));
-    if (command.csv_file) {
-      telemetry::CsvSink csv(*command.csv_file, 0, replay::names_of(run, settings));
-      for (const replay::RerunCycle& cycle : rerun) csv.consume(cycle.record, cycle.distance_m);
-      csv.finish();
+    if (csv) {
+      for (const replay::RerunCycle& cycle : rerun) csv->consume(cycle.record, cycle.distance_m);
+      csv->finish();
     }
     return exit_completed;
   } catch (const telemetry::RecordingError& error) {
@@ -79,6 +86,11 @@ int replay_run(const ReplayCommand& command) {
 
 int convert(const ConvertCommand& command) {
   const std::string from = log_in(command.from);
+  const std::filesystem::path folder = std::filesystem::path(command.to).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder)) {
+    throw config::ConfigError("convert: OUT = " + command.to + ": there is no folder " + folder.string() +
+                              "; create it first");
+  }
   if (std::filesystem::path(command.to).extension() != ".csv") {
     throw config::ConfigError("convert: OUT = " + command.to + ": give a name that ends in .csv, .mcap or .parquet");
   }

@@ -151,7 +151,7 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
 }
 
 std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
-                                           const run_folder::RunEnvironment& environment) {
+                                           const run_folder::RunEnvironment& environment, bool complete) {
   std::vector<std::string> problems;
   const auto attempt = [&problems](auto&& work) {
     try {
@@ -174,7 +174,7 @@ std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
       folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(curve->result())));
     }
     folder_->write(run_folder::file::environment, run_folder::environment_json(environment));
-    folder_->seal();
+    if (problems.empty() && complete) folder_->seal();
   });
   return problems;
 }

@@ -37,9 +37,10 @@ class RunOutputs {
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
   /// Writes summary and histogram if requested, and completes the run folder. Tries each, even after a failure. Returns
-  /// what could not be written, as text.
+  /// what could not be written, as text. A folder that lacks something gets no seal.
+  /// @param complete  nothing of the recorded data was lost
   [[nodiscard]] std::vector<std::string> write(const analysis::RunSummary& summary,
-                                               const run_folder::RunEnvironment& environment);
+                                               const run_folder::RunEnvironment& environment, bool complete);
   /// The run folder, if there is one.
   [[nodiscard]] const std::optional<run_folder::RunFolder>& folder() const noexcept { return folder_; }
 

@@ -17,6 +17,7 @@ class BadInput(ProgramTest):
                 self.assertIn(word, lines[0])
             self.assertFalse(summary.exists())
             self.assertFalse(csv.exists(), 'a refused run must not touch files')
+        return result
 
     def test_no_argument_at_all(self):
         """It says what to type, and starts nothing."""
@@ -65,6 +66,7 @@ class BadInput(ProgramTest):
         self.refused(['--backend', 'moon'], ['moon', 'sim'])
         self.refused(['--bogus'], ['--bogus'])
         self.refused(['--rt', 'perhaps'], ['perhaps'])
+        self.refused(['--set', 'control.slip_ref', '=', '0.1'], ['unexpected word =', 'without spaces'])
 
     def test_files(self):
         self.refused(['--plant', '/nonexistent.toml'], ['/nonexistent.toml'])
@@ -80,6 +82,32 @@ class BadInput(ProgramTest):
             result = self.run_program('--fast', '--no-lcm', option, '/nonexistent/dir/file')
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn('/nonexistent/dir/file', result.stderr)
+
+    def test_results_that_would_replace_an_input_or_each_other(self):
+        log, config, run = self.folder / 'run.lcmlog', self.folder / 'own.toml', self.folder / 'run'
+        config.write_text('[control]\nslip_ref = 0.1\n')
+        self.fast('--log', log, '--out', run)
+        kept = {path: path.read_bytes() for path in (log, config, run / 'run.csv')}
+        both = self.folder / 'both'
+        for args, words in ((['--fast', '--no-lcm', '--config', config, '--csv', config], 'this command reads it'),
+                            (['--fast', '--no-lcm', '--csv', both, '--log', both], 'another result goes into the same file'),
+                            (['replay', log, '--csv', log], 'this command reads it'),
+                            (['replay', run, '--csv', run / 'run.csv'], 'this command reads it'),
+                            (['convert', log, self.folder / 'no' / 'x.csv'], 'there is no folder')):
+            result = self.run_program(*args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(words, result.stderr)
+        self.assertFalse(both.exists())
+        for path, content in kept.items():
+            self.assertEqual(path.read_bytes(), content)
+
+    def test_texts_that_no_terminal_should_get(self):
+        bad = self.folder / 'bad.toml'
+        bad.write_text('[control]\ncontroller = "pi\\u0000\\u001b[31m"\n')
+        result = self.refused(['--config', bad], ['pi\\x00\\x1b[31m', 'give one of adaptive'])
+        self.assertNotIn('\x1b', result.stderr)
+        bad.write_text('a' * 100_000 + ' = 1\n')
+        self.refused(['--config', bad], ['unknown key aaa'])
 
     def test_lcm_url(self):
         result = self.run_program('--fast', '--lcm-url', 'nonsense')

@@ -48,14 +48,38 @@ TEST_CASE("a result appears whole or not at all, and an older file stays until t
   CHECK(content(path) == "older");
   CHECK(files_in(scratch.path) == 1);
   ResultFile first(path, "result");
-  ResultFile second(path, "result");  // of another process
   first.append("fir");
   first.append("st");
-  second.write("second");
-  CHECK(content(path) == "second");
+  put(path, "second");  // by another process
   first.commit();
   CHECK(content(path) == "first");
   CHECK(files_in(scratch.path) == 1);
+}
+
+TEST_CASE("two results of one process do not go into the same file, nor into one that it reads") {
+  const TemporaryFolder scratch;
+  put(scratch / "input", "read");
+  fs::create_directory(scratch / "recorded");
+  put(scratch / "recorded" / "run.csv", "read");
+  fs::create_symlink(scratch / "input", scratch / "link");
+  note_input(scratch / "input");
+  note_input(scratch / "recorded");
+  const auto refusal = [](const fs::path& path) -> std::string {
+    try {
+      ResultFile(path, "result").write("lost");
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "written";
+  };
+  CHECK_THAT(refusal(scratch / "link"), Catch::Matchers::Contains("this command reads it"));
+  CHECK_THAT(refusal(scratch / "recorded" / ".." / "recorded" / "run.csv"), Catch::Matchers::Contains("reads it"));
+  CHECK(content(scratch / "input") == "read");
+  {
+    const ResultFile first(scratch / "result", "result");
+    CHECK_THAT(refusal(scratch / "result"), Catch::Matchers::Contains("another result goes into the same file"));
+  }
+  CHECK(refusal(scratch / "result") == "written");
 }
 
 TEST_CASE("a file that is shown holds what was flushed, with or without its commit") {
