@@ -62,6 +62,9 @@ std::string unexpected(const CLI::App& program) {
     }
     return "unknown option " + word + rig::nearest_hint(word, names);
   }
+  if (word.find_first_of("=.0123456789") == 0) {
+    return "unexpected word " + word + ": write key=value without spaces, or in quotes";
+  }
   for (const CLI::App* subcommand : app->get_subcommands({})) {
     if (!subcommand->get_name().empty()) names.push_back(subcommand->get_name());
   }

@@ -24,7 +24,8 @@ namespace {
 toml::table parse(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) {
-    throw ConfigError(fmt::format("{}: no such file; give the path of a TOML file", file.string()));
+    throw ConfigError(fmt::format("{}: {}; give the path of a TOML file", file.string(),
+                                  fs::exists(file, error) ? "not a regular file" : "no such file"));
   }
   try {
     std::ifstream in(file, std::ios::binary);

@@ -130,8 +130,9 @@ void list_keys(bool json) {
     value_width = std::max(value_width, config::value_text(key).size());
   }
   for (const config::Key& key : table.keys()) {
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {} [{}]\n", key.name, name_width, config::value_text(key), value_width,
-               valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning, class_of(key));
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, config::value_text(key), value_width,
+               valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning,
+               config::safety_of(key).kind != rig::SafetyClass::Kind::none ? fmt::format(" [{}]", class_of(key)) : "");
   }
 }
 

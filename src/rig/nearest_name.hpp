@@ -8,8 +8,10 @@
 
 namespace abs_hil::rig {
 
-/// Levenshtein distance of two names.
+/// Levenshtein distance of two names. A text of more than 200 bytes is no name, and as far from another as it is long.
 [[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
+  constexpr std::size_t longest_name = 200;
+  if (std::max(a.size(), b.size()) > longest_name) return std::max(a.size(), b.size());
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
   for (std::size_t i = 1; i <= a.size(); ++i) {

@@ -46,7 +46,8 @@ std::string reason_text(const RunOutcome& outcome, const config::Settings& s, st
                         const nlohmann::ordered_json& foreign) {
   std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (rig::is_fault(outcome.reason)) {
-    const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
+    std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
+    if (bound == "0") bound.clear();  // it stands for a default
     text = rig::reason_with_value(outcome.reason, outcome.reason_value, own_signals, bound) +
            identity_hint(outcome.reason, s);
   }

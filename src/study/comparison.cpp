@@ -15,7 +15,8 @@ namespace {
 
 using analysis::Better, analysis::Figure, analysis::Metrics;
 
-/// A metric of every run, in order; NaN for runs that ended by a fault.
+/// A metric of every run, in order; NaN for runs that ended by a fault. Of one that should be near zero the size
+/// counts: errors of both signs must not cancel.
 std::vector<double> values_of(const std::vector<RunResult>& runs, double Metrics::*metric, bool magnitude = false) {
   std::vector<double> values;
   values.reserve(runs.size());

@@ -46,7 +46,9 @@ Cells cells_of(const ComparisonTable& table, const std::string& corner, std::siz
   for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
     const analysis::Figure& metric = compared_metrics()[m];
     std::vector<std::string>& row = cells.emplace_back();
-    row.push_back(metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit));
+    const std::string title =  // as `values_of` takes it
+        fmt::format("{}{}", metric.title, metric.better == analysis::Better::nearer_zero ? ", size" : "");
+    row.push_back(metric.unit.empty() ? title : fmt::format("{} / {}", title, metric.unit));
     for (std::size_t c = first; c < table.columns.size(); ++c)
       row.push_back(cell(table.columns[c], m, metric.decimals));
   }

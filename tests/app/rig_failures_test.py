@@ -164,7 +164,7 @@ class RigFailures(RigTest):
                 emulator.end()
 
     def test_host_limits_on_supply_and_temperature(self):
-        for setting, command, words in (('gate.supply_min_V=20', 'supply 18', 'supply is below gate.supply_min_V'),
+        for setting, command, words in (('gate.supply_min_V=20', 'supply 18', 'supply is off or below gate.supply_min_V'),
                                         ('gate.temperature_max_C=60', 'temperature 70', 'hotter than gate.temp')):
             with self.subTest(setting):
                 emulator = self.emulator('--lock-step', '--command', command)

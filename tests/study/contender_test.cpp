@@ -39,6 +39,7 @@ TEST_CASE("a contender has the settings of its own over the common ones") {
   CHECK(soft.settings.model.tyre.theta_N == 20.0);
   CHECK(soft.settings.plant.rig.tyre.theta_N == common.plant.rig.tyre.theta_N);
   CHECK(soft.changes.front() == std::pair<std::string, std::string>("control.adaptive.gamma", "60"));
+  CHECK(read_contender("adaptive{ gamma = 60 }", common).settings.control.adaptive.gamma == 60.0);
   CHECK(read_contender("adaptive{gamma=60}", common).name == "adaptive{gamma=60}");
   CHECK(read_contender("pi", common).settings.control.slip_ref == 0.1);
 }

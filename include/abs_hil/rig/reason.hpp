@@ -83,12 +83,13 @@ enum class ReplayFinds : std::uint8_t {
       "late cycles in a row", "")                                                \
   ROW(board_supply_tripped, 80, fault, yes, "the board's own interlock tripped: supply undervoltage",                 \
       "trip flags", "", "0")                                                                                          \
-  ROW(board_supply_low, 81, fault, yes, "the board's supply is below gate.supply_min_V",                              \
+  ROW(board_supply_low, 81, fault, yes, "the board's supply is off or below gate.supply_min_V",                              \
       "supply", "V", "gate.supply_min_V")                                                                             \
   ROW(board_too_hot, 82, fault, yes, "the board is hotter than gate.temperature_max_C",                               \
       "temperature", "degrees Celsius", "gate.temperature_max_C")                                                     \
   ROW(foreign_writer, 83, fault, no,                                                                                  \
-      "an output did not keep the value that was sent: something else writes to the board, or its logic restarted")   \
+      "an output did not keep the value that was sent: something else writes to the board or talks to it, or its "      \
+      "logic restarted")   \
   ROW(board_reconfigured, 84, fault, no,                                                                              \
       "the board's version or settings changed during the run: its logic was loaded again, or something else writes " \
       "to it")                                                                                                        \
@@ -166,8 +167,8 @@ enum class ReplayFinds : std::uint8_t {
       "or the encoders have too few counts",                                                                          \
       "time without a verdict", "s", "gate.judge_within_s")                                                           \
   ROW(cycle_gap, 221, fault, no,                                                                                      \
-      "no cycle ran for longer than realtime.cycle_gap_max_s while an output was on: the program was stopped, "       \
-      "frozen or kept from the processor",                                                                            \
+      "no cycle ran for longer than realtime.cycle_gap_max_s (by default guardian.timeout_ms) while an output was "   \
+      "on: the program was stopped, frozen or kept from the processor, or the board took that long",                                                                            \
       "time from one cycle to the next", "s", "realtime.cycle_gap_max_s")                                             \
   ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on",                        \
       "time suspended", "s", "0")                                                                                     \
@@ -180,9 +181,9 @@ enum class ReplayFinds : std::uint8_t {
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
       "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \
   ROW(hm2_silent, 240, fault, no,                                                                                     \
-      "hm2 board and program lost ten datagrams in a row: the board's watchdog drops all outputs")                    \
+      "hm2 board and program lost ten datagrams in a row, or too many: the board's watchdog drops all outputs")                    \
   ROW(hm2_watchdog_bit, 241, fault, no,                                                                               \
-      "hm2 board's watchdog dropped all outputs: no command came in its time")                                        \
+      "hm2 board's watchdog dropped all outputs: no command came in its time, or somebody made it bite")                                        \
   ROW(hm2_outputs_off, 242, fault, no, "hm2 board's pins are no longer the outputs that were set up (DDR)")           \
   ROW(hm2_quadrature_error, 243, fault, no,                                                                           \
       "hm2 board's counter saw both signals of an encoder change at once: encoder, cable or interference")            \

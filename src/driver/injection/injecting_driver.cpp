@@ -170,6 +170,15 @@ std::vector<std::string> InjectingDriver::notes() const {
   return notes;
 }
 
+std::vector<std::string> InjectingDriver::tally() const {
+  std::vector<std::string> lines = inner_->tally();
+  for (const Planned& planned : planned_) {
+    const bool began = planned.entered_ns >= 0 && now_ns_ >= planned.entered_ns + ns_of(planned.injection.delay_s);
+    if (!began) lines.push_back("the injected fault " + to_text(planned.injection) + " never began: the run was over");
+  }
+  return lines;
+}
+
 void InjectingDriver::do_activate(std::int64_t now_ns) {
   inner_->activate(now_ns);
   random_.seed(seed_);

@@ -138,7 +138,7 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] IoResult try_write() noexcept override { return inner_->try_write(); }
   [[nodiscard]] BoardIdentity identity() const override { return inner_->identity(); }
   [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return inner_->outputs_now(applied); }
-  [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
+  [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::optional<AnswerTimes> answer_times() const override { return inner_->answer_times(); }
   [[nodiscard]] std::vector<std::string> traffic() const override { return inner_->traffic(); }
   [[nodiscard]] std::string_view watched_cable() const noexcept override { return inner_->watched_cable(); }

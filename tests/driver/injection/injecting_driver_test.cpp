@@ -93,6 +93,15 @@ TEST_CASE("a fault begins with its phase and delay, and ends with its duration")
   CHECK(bench.measurement.upper_counts == 600);  // the counts lost are lost for good
 }
 
+TEST_CASE("a fault that never began is told after the run") {
+  Bench bench("coast@encoder_upper:stuck, brake@encoder_upper:stuck+1s, brake@encoder_lower:stuck");
+  REQUIRE(bench.cycle());
+  const auto told = bench.driver.tally();
+  REQUIRE(told.size() == 2);
+  CHECK_THAT(told[0], Catch::Matchers::Contains("coast@encoder_upper:stuck never began"));
+  CHECK_THAT(told[1], Catch::Matchers::Contains("+1s never began"));
+}
+
 TEST_CASE("encoders: the effect of each kind on the counts") {
   const auto upper_after = [](std::string_view fault, int cycles) {
     Bench bench(std::string("any@encoder_upper:") + std::string(fault) + "+11ms");
