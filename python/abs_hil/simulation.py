@@ -60,6 +60,8 @@ def _law_of(controller: Any) -> Any:
     """The controller's object; None for a name. Raises ValueError for an object that is no controller."""
     if controller is None or isinstance(controller, str):
         return None
+    if isinstance(controller, type):
+        raise ValueError(f'controller: {controller.__name__} is a class; give an object of it, {controller.__name__}()')
     if callable(getattr(controller, 'reset', None)) and callable(getattr(controller, 'step', None)):
         return controller
     raise ValueError(f'controller: {type(controller).__name__} has no methods reset and step; give a controller\'s name or an '

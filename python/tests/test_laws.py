@@ -30,6 +30,15 @@ class Wordy(Proportional):
     def step(self, input):
         return "much"
 
+class Chatty(Proportional):
+    def reset(self, input):
+        super().reset(input)
+        print("begins")
+
+class Failing(Proportional):
+    def __init__(self):
+        1 / 0
+
 class Alone:
     pass
 
@@ -43,6 +52,7 @@ QUICK_SET = ('--set', 'experiment.start_speed_rad_s=170')
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     (tmp_path / 'laws.py').write_text(LAWS)
+    (tmp_path / 'wrong.py').write_text('import abs_hil\nclass Law(:\n')
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     return tmp_path
@@ -82,11 +92,13 @@ def test_a_comparison_and_a_study_take_it(folder, abs_hil_program):
                                         ('nowhere:Law', "No module named 'nowhere'; give MODULE:CLASS"),
                                         ('laws:Alone', 'it has no methods reset and step'),
                                         ('laws:Demanding', 'the class is made without arguments'),
+                                        ('laws:Failing', 'laws.py, line 29)\n'),
+                                        ('wrong:Law', 'SyntaxError: invalid syntax (wrong.py, line 2)\n'),
                                         ('my-laws:Law', 'MODULE:CLASS')])
 def test_a_class_that_cannot_be_used_is_refused_by_name(folder, name, said, abs_hil_program):
     result = abs_hil_program('--fast', '--no-lcm', '--controller', name, *QUICK_SET, status=2)
     assert name in result.stderr and said in result.stderr
-    assert 'programs.py' not in result.stderr  # no traceback through the program's own code
+    assert 'programs.py' not in result.stderr and 'At:' not in result.stderr  # no traceback through the program's own code
 
 
 @pytest.mark.parametrize('name, said', [('laws:Broken', 'ZeroDivisionError'), ('laws:Wordy', 'could not convert string to float')])
@@ -94,6 +106,11 @@ def test_what_its_step_raises_ends_the_run_with_a_fault(folder, name, said, abs_
     result = abs_hil_program('--fast', '--no-lcm', '--controller', name, *QUICK_SET, status=1)
     assert said in result.stderr
     assert f'(controller {name}): its code ended its process with status 1 in step' in result.stdout + result.stderr
+
+
+def test_what_it_prints_comes_out_on_stderr(folder, abs_hil_program):
+    result = abs_hil_program('--fast', '--no-lcm', '--controller', 'laws:Chatty', *QUICK_SET)
+    assert 'begins\n' in result.stderr and 'begins' not in result.stdout
 
 
 @pytest.mark.parametrize('accepted, said', [('false', 'try it with --backend sim first'),

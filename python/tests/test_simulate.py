@@ -128,6 +128,8 @@ def test_bad_runs_of_a_study():
     assert np.isnan(study['stop_time_s'][1]) and study['stop_time_s'][0] > 0
     with pytest.raises(ValueError, match='object has no methods reset and step'):
         abs_hil.simulate_many([{'controller': object()}])
+    with pytest.raises(ValueError, match=r'controller: Constant is a class; give an object of it, Constant\(\)'):
+        abs_hil.simulate(Constant)
     with pytest.raises(ValueError, match='without faults'):
         abs_hil.simulate_many([{'inject': ['brake@encoder_upper:stuck']}])
     with pytest.raises(ValueError, match='list of values'):
@@ -290,5 +292,6 @@ def test_a_drawn_rig_is_the_same_for_a_seed_and_the_program_runs_on_it(tmp_path,
         assert ('from' in drawn['plant.friction_profile']['value']) == (kind == 'wandering')
         assert (drawn['plant.upper_encoder_eccentricity_rad']['value'] > 0.0) == (kind == 'wandering')
         assert abs_hil.simulate(plant=file, model='paper-table1').summary['stop_distance_m'] > 1.0
+    assert 'no whole number from 0' in abs_hil_program('rig', 'steady', '-1', '--out', tmp_path / 'n.toml', status=2).stderr
     refused = abs_hil_program('rig', 'steady', '7', '--out', files['steady'], status=2).stderr
     assert 'exists; give another --out, or --force' in refused

@@ -3,29 +3,30 @@ import importlib
 import inspect
 import os
 import sys
+import traceback
 from collections.abc import Callable
 from typing import Any
 
 from ..core import _core, load_network
 
 
-def class_of(name: str) -> Any:
-    """The class MODULE:CLASS, of a module in this folder or on PYTHONPATH. Raises ValueError."""
+def made(name: str) -> Any:
+    """A new object of the class MODULE:CLASS, of a module in this folder or on PYTHONPATH. Raises ValueError."""
     module, _, inner = name.partition(':')
     if '' not in sys.path:
         sys.path.append('')  # the folder in which the program was started, as of `python -m`
+    fix = '; give MODULE:CLASS, of a module in this folder or on PYTHONPATH'
     try:
-        return getattr(importlib.import_module(module), inner)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f'controller {name}: {error}; give MODULE:CLASS, of a module in this folder or on PYTHONPATH') from None
-
-
-def made(name: str) -> Any:
-    """A new object of the class. Raises ValueError."""
-    try:
-        law = class_of(name)()
-    except TypeError as error:
-        raise ValueError(f'controller {name}: {error}; the class is made without arguments') from None
+        law_class = getattr(importlib.import_module(module), inner)
+        fix = '; the class is made without arguments'
+        law = law_class()
+    except (Exception, SystemExit) as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        if isinstance(error, SyntaxError):
+            fix = ''  # its text has file and line
+        elif last.filename != __file__ and not last.filename.startswith('<frozen'):
+            fix = f' ({last.filename}, line {last.lineno})'
+        raise ValueError(f'controller {name}: {type(error).__name__}: {error}{fix}') from None
     if not (callable(getattr(law, 'reset', None)) and callable(getattr(law, 'step', None))):
         raise ValueError(f'controller {name}: it has no methods reset and step (docs/python.md)')
     return law
@@ -46,4 +47,5 @@ def main(arguments: list[str]) -> int:
     except OSError:
         print('abs_python_host: abs_hil starts this program by itself, for --controller MODULE:CLASS', file=sys.stderr)
         return 2
+    sys.stdout = sys.stderr  # as run_host does, but whole lines come out at once: this process may end at any time
     return load_network('a controller in Python').serve_controller(_parts)

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core import load_network
+from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, PHASES, QUANTITIES, decode
 from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
-from .runs import MESSAGES, MOST_RUNS, MOST_TEXT, RunFacts
+from .runs import LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, RunFacts
 
 Packet = tuple[str, bytes]
 #: a listener gets the run and its new rows, of shape (cycles, WIDTH)
@@ -23,8 +23,6 @@ IDLE_S = 0.2
 MOST_PACKETS = 5000
 #: networks may deliver a few messages out of order; a cycle further back belongs to another run
 LATE_CYCLES = 16
-#: no run is longer
-LONGEST_S = 1e6
 #: cycles of 60 ms at 10 kHz
 MOST_IN_WINDOW = 600
 #: of a point of the tyre's force over slip: its window, the fewest cycles in it, the least speed
@@ -100,7 +98,7 @@ class Feed:
             self._flush()
             self._names = names
             if self._run is not None:
-                self._run.own = tuple(name for name in names.split(',') if name and name not in PLACE)[:MOST_SIGNALS]
+                self._run.own = tuple(filter(_core.is_signal_name, dict.fromkeys(names.split(','))))[:MOST_SIGNALS]
         if self._early and self._run is not None:
             for early in self._early.values():
                 self._run.take(early)

@@ -9,6 +9,8 @@ from ..nesting import parse_json
 from .history import PLACE
 
 MOST_MARKS, MOST_EVENTS, MOST_RUNS = 200, 200, 20
+#: no run is longer
+LONGEST_S = 1e6
 #: characters of a text from the network
 MOST_TEXT = 300
 #: what RunFacts takes beside the cycles
@@ -86,7 +88,7 @@ class RunFacts:
 
     def _take_event(self, event: Any) -> None:
         known = REASONS.get(event.reason, {})
-        self.events.append({'time_s': number(event.time_s) or 0.0, 'kind': event.kind[:MOST_TEXT],
+        self.events.append({'time_s': event.time_s if 0 <= event.time_s <= LONGEST_S else 0.0, 'kind': event.kind[:MOST_TEXT],
                             'text': (event.message or event.reason_text)[:MOST_TEXT],
                             'reason': event.reason_text[:MOST_TEXT], 'value': number(event.value),
                             **{key: known.get(key, '') for key in ('quantity', 'unit', 'bound')}})

@@ -12,6 +12,7 @@ import numpy as np
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from ..messages import PHASES, REASONS
+from ..nesting import parse_json
 from .feed import Feed
 from .history import PLACE, own_place
 from .runs import RunFacts
@@ -142,7 +143,7 @@ class Viewer:
             return
         self._tokens -= 1.0
         try:
-            asked = json.loads(data)
+            asked = parse_json(data)
             if not isinstance(asked, dict):
                 raise Bad('a request is a JSON object')
             handler = {'show': self._show, 'trigger': self._arm, 'rows': self._rows,
@@ -150,8 +151,6 @@ class Viewer:
             if handler is None:
                 raise Bad('do: give show, trigger, rows or command')
             handler(asked)
-        except RecursionError:
-            self._note_bad('JSON too deep')
         except (ValueError, TypeError) as error:
             self._note_bad(str(error))
 
@@ -187,7 +186,8 @@ class Viewer:
             raise Bad('the command before has no answer yet')
         if len(self._tasks) > 2:
             return  # stops under way: each repeats itself until it is answered
-        order = (text(asked, 'command'), str(asked.get('name', ''))[:200], real({'value': asked.get('value') or 0.0}, 'value'))
+        order = (text(asked, 'command'), text({'name': asked.get('name') or ''}, 'name'),
+                 real({'value': asked.get('value') or 0.0}, 'value'))
 
         async def run() -> None:
             accepted, answer = await self._command(*order)
@@ -276,7 +276,7 @@ def _given(asked: dict[str, Any], name: str, kind: Any, valid: Callable[[Any], b
 
 
 def text(asked: dict[str, Any], name: str) -> str:
-    return _given(asked, name, str, lambda value: len(value) <= 200, 'a text')
+    return _given(asked, name, str, lambda value: len(value) <= 200 and value.isprintable(), 'a text that can be printed')
 
 
 def _one_of(asked: dict[str, Any], name: str, known: tuple[str, ...]) -> str:
@@ -287,7 +287,7 @@ def _one_of(asked: dict[str, Any], name: str, known: tuple[str, ...]) -> str:
 
 
 def real(asked: dict[str, Any], name: str) -> float:
-    return float(_given(asked, name, (int, float), math.isfinite, 'a number'))
+    return float(_given(asked, name, (int, float), lambda value: abs(value) <= 1e308, 'a number up to 1e308'))
 
 
 def whole(asked: dict[str, Any], name: str) -> int:
