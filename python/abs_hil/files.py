@@ -29,6 +29,14 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *,
                          if error.strerror else str(error)) from None
 
 
+def make_folder(folder: pathlib.Path, option: str) -> None:
+    """Makes a folder for results, if there is none. Raises ValueError if that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f'{option} "{folder}" cannot be made: {error.strerror}; give a folder in a writable one') from None
+
+
 def refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
     """Raises ValueError if a file is there and may not be replaced. A device or a pipe keeps nothing."""
     if not replace and path.is_file():

@@ -1,11 +1,12 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
+import argparse
 import functools
 import operator
 import os
 import pathlib
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Union
 
 from .core import _core, load_network
@@ -58,6 +59,15 @@ def _assignments(values: Any) -> list[str]:
         except ValueError as error:
             raise ValueError(f'set: {key}: {error}') from None
     return assignments
+
+
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """A type of argparse: a whole number of this range."""
+    def number(text: str) -> int:
+        if not text.strip().lstrip('+-').isdecimal() or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f'"{text}" is no whole number from {least} to {most}')
+        return int(text)
+    return number
 
 
 def _seed(seed: Any) -> str:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from .files import refuse_existing, write_text
+from .options import whole
 from .simulation import keys
 
 #: key: largest change, over the value of START
@@ -52,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser('abs_hil rig', allow_abbrev=False, description='Writes a simulated rig that a class does not '
                                      'know, as a file for --plant (docs/class.md)')
     parser.add_argument('kind', choices=('steady', 'wandering'), help='whether it changes a little all the time')
-    parser.add_argument('seed', metavar='SEED', type=int, help='which one; the same number is the same rig')
+    parser.add_argument('seed', metavar='SEED', type=whole(0, 2**63 - 1), help='which one; the same number is the same rig')
     parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('rig.toml'), help='[rig.toml]')
     parser.add_argument('--force', action='store_true', help='replace an existing file')
     o = parser.parse_args(arguments)

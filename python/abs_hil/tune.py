@@ -12,8 +12,8 @@ import numpy as np
 
 from .core import _core
 from .figures import OVERSHOOT
-from .files import write_text, write_whole
-from .options import options
+from .files import make_folder, write_text, write_whole
+from .options import options, whole
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 
 #: the paper brakes from 1625 rpm
@@ -204,30 +204,21 @@ def to_toml(judge: Judge, found: Found, comment: str) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _number(least: int, most: int) -> Callable[[str], int]:
-    def number(text: str) -> int:
-        value = int(text)
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f'{value} is not in [{least}, {most}]')
-        return value
-    return number
-
-
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_tune', allow_abbrev=False, description="Searches for a controller's gains in "
                                    'simulation and writes them as a configuration file')
-    made.add_argument('--controllers', '--controller', metavar='A,B,...', default='',
+    made.add_argument('--controllers', '--controller', metavar='A,B,...',
                       help='controllers to tune (default: all that have gains)')
     made.add_argument('--plants', metavar='A,B,...', default='paper-table1,paper-timing',
                       help='plants to tune on [paper-table1,paper-timing]')
     made.add_argument('--model', metavar='NAME|FILE', help="the controllers' model, by name or TOML file (default: each plant)")
     made.add_argument('--folder', metavar='DIR', required=True, type=pathlib.Path,
                       help='folder for CONTROLLER.toml; made if there is none')
-    made.add_argument('--cases', metavar='N', default=6, type=_number(1, 1000), help='varied plants for each plant [6]')
-    made.add_argument('--generations', metavar='N', default=24, type=_number(1, 10_000),
+    made.add_argument('--cases', metavar='N', default=6, type=whole(1, 1000), help='varied plants for each plant [6]')
+    made.add_argument('--generations', metavar='N', default=24, type=whole(1, 10_000),
                       help='generations of the search [24]')
-    made.add_argument('--seed', metavar='N', default=1, type=_number(0, 2**63 - 1), help='seed of the search [1]')
-    made.add_argument('--threads', metavar='N', default=0, type=_number(0, 1024),
+    made.add_argument('--seed', metavar='N', default=1, type=whole(0, 2**63 - 1), help='seed of the search [1]')
+    made.add_argument('--threads', metavar='N', default=0, type=whole(0, 1024),
                       help='number of threads, 0: one for each processor; does not change the results [0]')
     made.add_argument('--version', action='version', version=_core.version)
     return made
@@ -236,7 +227,7 @@ def parser() -> argparse.ArgumentParser:
 def _tune(controller: str, o: argparse.Namespace) -> None:
     plants = [name for name in o.plants.split(',') if name]
     judge = Judge(controller, Training(plants, o.cases, o.model, o.threads))
-    o.folder.mkdir(parents=True, exist_ok=True)
+    make_folder(o.folder, '--folder')
     path = o.folder / f'{controller}.toml'
     write_whole(path, lambda name: None, probe=True)
 
@@ -255,7 +246,10 @@ def _tune(controller: str, o: argparse.Namespace) -> None:
 def main(arguments: list[str]) -> int:
     o = parser().parse_args(arguments)
     try:
-        for controller in [name for name in o.controllers.split(',') if name] or tunable():
+        chosen = tunable() if o.controllers is None else [name for name in o.controllers.split(',') if name]
+        if not chosen or not o.plants.strip(','):
+            raise ValueError('--controllers, --plants: give at least one name, or leave the option out')
+        for controller in chosen:
             _tune(controller, o)
     except (ValueError, OSError) as error:
         print(f'abs_tune: {error}', file=sys.stderr)

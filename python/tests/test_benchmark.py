@@ -14,6 +14,7 @@ import sys
 import pytest
 
 import abs_hil
+from abs_hil import programs
 from abs_hil.benchmark import Entry, bounds, cases, run
 from abs_hil.benchmark.program import main
 from abs_hil.report.page import Unavailable, plotly_js
@@ -236,9 +237,26 @@ def test_program(tmp_path, capsys):
     assert len(found['controllers'][0]['runs']) == len(cases.quick_cases()) == 12
     assert 'no score' in (tmp_path / 'page.md').read_text(encoding='utf-8')
     for wrong in (['--controller', 'no-such-law'], ['--controller', 'no_module:Law'], ['--set', 'plant.theta_N=3'],
-                  ['--draw', '-1'], ['--json', str(tmp_path / 'none' / 'x.json')]):
+                  ['--json', str(tmp_path / 'none' / 'x.json')]):
         assert main(['--quick', *wrong]) == 2
         assert capsys.readouterr().err.startswith('abs_hil benchmark: ')
+
+
+@pytest.mark.parametrize(('given', 'words'), [
+    (['--count', '5', '--quick'], '--count has no effect without --draw; leave it out'),
+    (['--bounds', 'nosuch'], '--bounds has no effect without --draw; leave it out'),
+    (['--verify', 'nosuch', '--json', 'new.json'], '--json has no effect with --verify; leave it out'),
+    (['--verify', 'nosuch'], '--verify "nosuch": no result of the benchmark; give a file'),
+    (['--verify', '.'], '--verify ".": no result of the benchmark; give a file'),
+    (['--draw', '-1'], '"-1" is no whole number from 0 to'),
+    (['--draw', '1', '--count', '0'], '"0" is no whole number from 1 to 10000'),
+    (['--quick', '--threads', '-1'], '"-1" is no whole number from 0 to 1024'),
+])
+def test_options_without_effect_are_refused(given, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr('abs_hil.benchmark.program.run', lambda *_: pytest.fail('it runs'))
+    assert programs.start('benchmark', given) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_anybody_can_check_a_result(tmp_path, capsys):

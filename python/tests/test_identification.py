@@ -2,6 +2,7 @@
 import dataclasses
 import gzip
 import json
+import re
 import subprocess
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from conftest import ABS_HIL
 
 import abs_hil
+from abs_hil import programs
 from abs_hil.core import _core
 from abs_hil.identification import intervals
 from abs_hil.identification.advice import advise, log_of
@@ -336,7 +338,17 @@ def test_pieces_leave_out_rest_and_changes_of_contact(logs):
     (lambda text: text.replace('upper_counts', 'count1'), 'lacks the columns upper_counts'),
     (lambda text: '\n'.join(text.split('\n')[:100]) + '\n', 'has 99 rows; give at least 200'),
     (lambda text: text.replace('\n0.5,', '\n0.1,', 1), 'time_s does not rise at row'),
-    (lambda text: text.replace(',0.0,1.0,', ',0.0,1.5,'), 'motor_pwm reaches 1.5; give duties from 0 to 1'),
+    (lambda text: text.replace(',0.0,1.0,', ',0.0,1.5,'), 'motor_pwm is 1.5 in row 1; give a duty from 0 to 1'),
+    (lambda text: text.replace(',0.0,1.0,', ',nan,1.0,', 1), 'brake_pwm is nan in row 1; give a duty from 0 to 1'),
+    (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0,\n', 1), 'wheels_apart is nan in row 1; give 0, or 1'),
+    (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0,2\n', 1), 'wheels_apart is 2 in row 1; give 0, or 1'),
+    (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0\n', 1), 'row 1 has 5 fields instead of 6'),
+    (lambda text: text.replace('\n0.0,', '\ninf,'), 'time_s is inf in row 1; give a time in seconds'),
+    (lambda text: text.replace('\n0.0,0,', '\n0.0,nan,'), 'upper_counts is nan in row 1; give whole counts of the encoder'),
+    (lambda text: text.replace('\n0.0,0,', '\n0.0,1e30,'), 'upper_counts is 1e.30 in row 1; give whole counts'),
+    (lambda text: text.replace('\n0.0,0,', '\n0.0,0.5,'), 'upper_counts is 0.5 in row 1; give whole counts'),
+    (lambda text: re.sub(r'\n([^,]+)', lambda row: f'\n{1000 * float(row[1] or 0):.9g}', text[:-1]) + '\n',
+     'time_s rises by 1 from row to row; give seconds'),
     (lambda text: 'nonsense', 'lacks the columns time_s'),
     (lambda text: text.replace(',0.0,1.0,', ',0.0,one,'), 'the column motor_pwm holds texts'),
 ])
@@ -357,6 +369,49 @@ def test_swapped_counters_are_refused(logs, start):
     swapped = [dataclasses.replace(log, counts=log.counts[:, ::-1]) for log in logs[:3]]
     with pytest.raises(ValueError, match='seem to be swapped'):
         abs_hil.identify(swapped, start)
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    (lambda log: {'counts': log.counts * [1, -1]}, 'lower_counts falls by .* give it the other sign'),
+    (lambda log: {'counts': log.counts * [-1, 1]}, 'upper_counts falls by .* give it the other sign'),
+    (lambda log: {'counts': log.counts + 5000 * (log.time_s > 4)[:, None] * [0, 1]}, 'lower_counts jumps by 50.. in row 4002'),
+    (lambda log: {'counts': np.floor(log.counts * [0.25, 1])}, 'one encoder has another number of counts per revolution'),
+    (lambda log: {'counts': np.floor(log.counts / 4096)}, 'with 4096 counts per revolution the upper wheel reaches .* unit'),
+    (lambda log: {'brake_pwm': log.motor_pwm, 'motor_pwm': log.brake_pwm}, 'brake_pwm and motor_pwm seem to be swapped'),
+])
+def test_columns_that_hold_something_else_are_named(logs, start, change, words, monkeypatch):
+    monkeypatch.setattr('abs_hil.identification.estimate.start_fit', lambda *_: pytest.fail('it fits'))
+    with pytest.raises(ValueError, match=words):
+        abs_hil.identify([dataclasses.replace(log, **change(log)) for log in logs[1:3]], start)
+
+
+def test_readings_that_the_rig_marks_as_lost_are_left_out():
+    run = abs_hil.simulate(experiment='pulses')
+    valid = np.arange(len(run)) % 50 != 7
+    run.columns['sample_valid'] = valid.astype(float)
+    run.columns['upper_counts'] = np.where(valid, run['upper_counts'], np.nan)
+    log = load_log(run)
+    assert len(log) == len(run) and (np.isnan(log.counts[:, 0]) == ~valid).all()
+
+
+@pytest.mark.parametrize(('given', 'words'), [
+    (['--seed', '-1'], 'whole number from 0'),
+    (['--fix', 'J2_kg_m2=nan'], r'--fix J2_kg_m2 = nan is not valid; give a number in \[0.0001, 1\] kg m\^2'),
+    (['--fix', 'J2_kg_m2=-1'], r'--fix J2_kg_m2 = -1 is not valid; give a number in'),
+    (['--fix', 'r2_m=inf'], r'--fix r2_m = inf is not valid; give a number in'),
+    (['--validate', 'nosuch'], 'nosuch'),
+    (['--out', '/proc/nosuch/out'], '--out "/proc/nosuch/out" cannot be made: .*; give a folder'),
+])
+def test_the_program_refuses_what_it_is_told_before_it_works(logs, tmp_path, monkeypatch, capsys, given, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr('abs_hil.identification.estimate.start_fit', lambda *_: pytest.fail('it fits'))
+    (tmp_path / 'log.csv').write_text(csv_of(logs[2]))
+    assert programs.start('identify', ['log.csv', '--no-report', '--out', 'new/out', *given]) == 2
+    said = capsys.readouterr().err
+    assert re.search(words, said) and 'first values' not in said
+    assert not (tmp_path / 'new').exists()
+    with pytest.raises(ValueError, match='seed -1'):
+        abs_hil.identify([logs[2]], seed=-1)
 
 
 def test_unknown_keys_are_refused(logs, start):

@@ -10,7 +10,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import abs_hil
-from abs_hil.learning import ID, Rigs, Task
+from abs_hil import programs
+from abs_hil.learning import ID, Rigs, Task, training
 from abs_hil.learning.rigs import FAULT_REWARD
 from abs_hil.learning.training import Policy, judge, returns, train
 
@@ -180,6 +181,16 @@ def test_training_improves_and_repeats():
     start = returns(Rigs(4, task, seed=9), Policy(np.zeros(Policy.SIZE)), 0).mean()
     assert returns(Rigs(4, task, seed=9), policy, 0).mean() > start
     assert judge(task, None, 'adaptive', 3).shape == (3,)
+
+
+@pytest.mark.parametrize('given', [['--output', 'none/l.json'], ['--output', '.'], ['--figure', 'none/f.svg'],
+                                   ['--figure', 'f.foo'], ['--generations', '0'], ['--seed', '-1']])
+def test_what_cannot_be_written_is_refused_before_the_training(given, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(training, 'train', lambda *_, **__: pytest.fail('it trains'))
+    assert programs.start('learn', given) == 2
+    assert given[1] in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_environments_branch():

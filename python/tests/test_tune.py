@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import abs_hil
-from abs_hil import programs
+from abs_hil import programs, tune
 from abs_hil.simulation import Study
 from abs_hil.tune import FAULT_COST, Judge, Training, cost_of, gains_of, search, to_toml, tunable
 
@@ -81,6 +81,21 @@ def test_unusable_names():
             Judge(controller, SMALL)
     with pytest.raises(ValueError, match='paper-tabel1'):
         Judge('pi', Training(['paper-tabel1']))
+
+
+@pytest.mark.parametrize(('given', 'words'), [
+    (['--controllers', ''], '--controllers, --plants: give at least one name'),
+    (['--controllers', 'pi', '--plants', ','], '--controllers, --plants: give at least one name'),
+    (['--controllers', 'pi', '--folder', 'a-file'], '--folder "a-file" cannot be made: File exists; give a folder'),
+    (['--seed', '-1'], '"-1" is no whole number from 0 to'),
+])
+def test_the_program_refuses_before_it_searches(given, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tune, 'search', lambda *_: pytest.fail('it searches'))
+    (tmp_path / 'a-file').write_text('')
+    assert programs.start('tune', ['--folder', 'tu', '--cases', '1', *given]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / 'tu').exists()
 
 
 @pytest.mark.parametrize('controller', ['pi', 'relay', 'five-phase'])

@@ -56,7 +56,7 @@ def _read(path: pathlib.Path) -> dict[str, dict[str, float]]:
     try:
         content = parse_json(path.read_text(encoding='utf-8'))
         version, found, kept = content['version'], dict(content['bounds']), content.get('checksum')
-    except (KeyError, TypeError, ValueError):
+    except (OSError, KeyError, TypeError, ValueError):
         raise ValueError(f'{path}: no file of bounds; give one that --bounds has written, or a new name') from None
     if version != VERSION:
         raise ValueError(f'{path}: bounds of version {version} of the benchmark, this is version {VERSION}; give a new name')

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ..core import _core
 from ..files import write_text, write_whole
-from ..options import Value
+from ..options import Value, whole
 from ..report.page import Unavailable, plotly_js
 from ..simulation import controllers
 from . import bounds, cases
@@ -31,13 +31,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--quick', action='store_true', help='12 cases with one seed: a check, no score')
     parser.add_argument('--warm', action='store_true',
                         help='scores laws that keep something of the last braking also after one braking of each case')
-    parser.add_argument('--draw', metavar='SEED', type=int, help='only cases that this seed draws; needs casadi')
-    parser.add_argument('--count', metavar='N', type=int, default=cases.DRAWN, help=f'how many of them ({cases.DRAWN})')
+    parser.add_argument('--draw', metavar='SEED', type=whole(0, 2**63 - 1), help='only cases that this seed draws; needs casadi')
+    parser.add_argument('--count', metavar='N', type=whole(1, 10_000), help=f'how many of them ({cases.DRAWN})')
     parser.add_argument('--bounds', metavar='FILE', type=pathlib.Path,
                         help='keeps the bounds of drawn cases, so that they need not be computed again')
     parser.add_argument('--verify', metavar='FILE', type=pathlib.Path,
                         help='makes the runs of a file of --json again; status 1 if anything differs')
-    parser.add_argument('--threads', metavar='N', type=int, default=0, help='0: one for each processor')
+    parser.add_argument('--threads', metavar='N', type=whole(0, 1024), default=0, help='0: one for each processor')
     parser.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
     parser.add_argument('--page', metavar='FILE', type=pathlib.Path,
                         help='the page with the groups of cases: HTML with figures for FILE.html, otherwise Markdown')
@@ -57,9 +57,7 @@ def _settings(texts: Sequence[str]) -> dict[str, Value]:
 def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict[str, float]]]:
     if given.draw is None:
         return (cases.quick_cases() if given.quick else cases.whole_set()), bounds.stored()
-    if given.draw < 0 or not 1 <= given.count <= 10_000:
-        raise ValueError(f'--draw {given.draw} --count {given.count}: give a seed of at least 0 and 1 to 10000 cases')
-    drawn = cases.drawn(given.draw, given.count)
+    drawn = cases.drawn(given.draw, given.count or cases.DRAWN)
     found = bounds.found(drawn, given.bounds)
     without = [case for case in drawn if not found[bounds.identity(case)]]
     for case in without:
@@ -77,8 +75,13 @@ def _verify(path: pathlib.Path, threads: int) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    given = _parser().parse_args(arguments)
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    idle = ({*vars(given)} - {'verify', 'threads'} if given.verify else () if given.draw is not None else ('bounds', 'count'))
     try:
+        for name in sorted(idle):
+            if getattr(given, name) != parser.get_default(name):
+                raise ValueError(f'--{name} has no effect {"with --verify" if given.verify else "without --draw"}; leave it out')
         if given.verify is not None:
             return _verify(given.verify, given.threads)
         settings = _settings(given.set)

@@ -38,8 +38,8 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
         entries = [(Entry(str(one['name']), dict(one['settings']), bool(one.get('warm'))), [dict(row) for row in one['runs']],
                     [dict(score) for score in one['scores']]) for one in document['controllers']]
         keys = [[(str(row['case']), int(row['seed'])) for row in rows] for _, rows, _ in entries]
-    except (KeyError, TypeError, ValueError, OverflowError):
-        raise ValueError(f'{path}: no result of the benchmark; give a file that --json has written') from None
+    except (OSError, KeyError, TypeError, ValueError, OverflowError):
+        raise ValueError(f'--verify "{path}": no result of the benchmark; give a file that --json has written') from None
     if version != cases.VERSION:
         raise ValueError(f'{path}: of version {version} of the benchmark, this is version {cases.VERSION}')
     known = bounds.stored()

@@ -6,12 +6,12 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from ..run import Run, names_apart
+from ..run import Run, names_apart, stretches
 from . import choices, discs, intervals, structure
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
 from .linear import run_filter, step
-from .logs import Log, load_log
+from .logs import Log, load_log, motion_of
 from .parameters import FORMS, WHEELS, checked_keys
 from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
 
@@ -19,6 +19,8 @@ from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
 LARGEST_RATIO = 1.5
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
 LARGEST_RMS = 1.0
+#: no motor drives a rig this fast
+FASTEST_RAD_S = 2000.0
 #: a fit whose last step went farther than this, in standard deviations, has not arrived
 LARGEST_LAST_STEP = 5.0
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
@@ -42,7 +44,9 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     that cannot serve and for unknown keys.
     """
     fix = dict(fix or {})
-    checked_keys(fix)
+    checked_keys(fix, start)
+    if seed < 0:
+        raise ValueError(f'seed {seed}: give a whole number of at least 0')
     if form != 'auto' and form not in FORMS:
         raise ValueError(f'form {form}: give auto, {" or ".join(FORMS)}')
     for name in drift:
@@ -57,7 +61,8 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     start_form = str(given['tyre'])
     values = {k: v for k, v in given.items() if isinstance(v, float)}
     values.update({key: number for key, number in fix.items() if number is not None})
-    _refuse_swapped(loaded)
+    counts_per_rev = int(given['encoder_counts_per_rev'])
+    _refuse_odd(loaded, values, counts_per_rev)
 
     fits: list[Fit] = []
     begun: list[Fit] = []
@@ -65,7 +70,10 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         say(f'{FORMS[name].meaning}: first values')
         problem = Problem.of(FORMS[name], start, loaded, fix, drift, WHEELS)
         if not any(problem.segments):
-            raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s)')
+            upper, lower = np.max([motion.speed_rad_s.max(axis=0) for motion in problem.motions], axis=0)
+            raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s): with '
+                             f'{counts_per_rev} counts per revolution the upper wheel reaches {upper:.3g} rad/s, the lower one '
+                             f'{lower:.3g}; are the counts of another unit?')
         try:
             begun.append(start_fit(problem, values, check, begun[0] if begun else None))
             # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
@@ -196,22 +204,46 @@ def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]
         return None
 
 
-def _refuse_swapped(logs: Sequence[Log]) -> None:
-    """The brake slows the upper wheel: while it acts most, the upper wheel turns less for a turn of the lower one than
-    while both roll."""
+def _refuse_odd(logs: Sequence[Log], plant: Mapping[str, float], counts_per_rev: int) -> None:
+    """Raises ValueError for logs whose columns cannot be what their names say, as their counts alone show."""
     for log in logs:
-        strong = (log.brake_pwm > 0) & (log.brake_pwm >= 0.95 * log.brake_pwm.max())
-        recent = round(0.5 / log.period_s)  # after a locked wheel, rolling takes its time
-        acted = np.convolve(log.brake_pwm > 0, np.ones(recent))[:len(log)] > 0
-        rolling = ~acted & (log.motor_pwm == 0)
-        ratios = []
-        for rows in (strong, rolling):
-            together = (rows & (log.wheels_apart == 0))[:-1]
-            turned = np.nansum(np.abs(np.diff(log.counts, axis=0))[together], axis=0)
-            ratios.append(turned[0] / turned[1] if turned.min() > 200 else np.nan)
-        if ratios[0] > 1.02 * ratios[1]:
-            cause = 'upper_counts and lower_counts seem to be swapped'
-            if not 1 / LARGEST_RATIO < ratios[1] < LARGEST_RATIO:
-                cause = 'the wheels seem to be apart at times; give a column wheels_apart that is 1 then and 0 otherwise'
-            raise ValueError(f'"{log.path}": {cause}: the upper wheel turns {ratios[0]:.4f} times as far as the lower one '
-                             f'while the brake acts, but {ratios[1]:.4f} times while neither brake nor motor acts')
+        for counts, name in zip(log.counts.T, ('upper_counts', 'lower_counts')):
+            rows = np.flatnonzero(np.isfinite(counts))
+            turned = np.diff(counts[rows])
+            most = FASTEST_RAD_S * counts_per_rev / (2 * np.pi) * np.maximum(np.diff(log.time_s[rows]), log.period_s)
+            if (jumps := np.flatnonzero(np.abs(turned) > most)).size:
+                raise ValueError(f'"{log.path}": {name} jumps by {turned[jumps[0]]:.0f} in row {rows[jumps[0] + 1] + 1}; give '
+                                 'counts that wrap at 32 bit only, and sample_valid 0 where a reading is lost')
+            if turned.sum() < -counts_per_rev:
+                raise ValueError(f'"{log.path}": {name} falls by {-turned.sum():.0f} from the first row to the last; give it the '
+                                 'other sign, so that it rises as the car drives')
+        _refuse_swapped(log, plant['r2_m'] / plant['r1_m'])
+        # Without the motor no wheel becomes faster than the other one was.
+        speed = motion_of(log, counts_per_rev).speed_rad_s
+        for begin, end in stretches(log.motor_pwm == 0):
+            lower = speed[begin:end, 1]
+            if (gain := (lower - np.minimum.accumulate(lower)).max()) > max(20.0, 0.5 * speed.max()):
+                raise ValueError(f'"{log.path}": the lower wheel gains {gain:.3g} rad/s while motor_pwm is 0, rows {begin + 1} to '
+                                 f'{end}: brake_pwm and motor_pwm seem to be swapped')
+
+
+def _refuse_swapped(log: Log, ratio: float) -> None:
+    """The brake slows the upper wheel: while it acts most, the upper wheel turns less for a turn of the lower one than
+    while both roll; that is about `ratio` turns."""
+    strong = (log.brake_pwm > 0) & (log.brake_pwm >= 0.95 * log.brake_pwm.max())
+    recent = round(0.5 / log.period_s)  # after a locked wheel, rolling takes its time
+    acted = np.convolve(log.brake_pwm > 0, np.ones(recent))[:len(log)] > 0
+    rolling = ~acted & (log.motor_pwm == 0)
+    ratios = []
+    for rows in (strong, rolling):
+        together = (rows & (log.wheels_apart == 0))[:-1]
+        turned = np.nansum(np.abs(np.diff(log.counts, axis=0))[together], axis=0)
+        ratios.append(turned[0] / turned[1] if turned.min() > 200 else np.nan)
+    cause = 'upper_counts and lower_counts seem to be swapped' if ratios[0] > 1.02 * ratios[1] else ''
+    if abs(np.log(ratios[1] / ratio)) > np.log(LARGEST_RATIO):
+        cause = ('the wheels seem to be apart at times (give a column wheels_apart that is 1 then and 0 otherwise), or one '
+                 'encoder has another number of counts per revolution')
+    if cause:
+        braked = '' if np.isnan(ratios[0]) else f', but {ratios[0]:.4f} times while the brake acts'
+        raise ValueError(f'"{log.path}": {cause}: the upper wheel turns {ratios[1]:.4f} times as far as the lower one '
+                         f'while neither brake nor motor acts{braked}')

@@ -4,6 +4,7 @@ import hashlib
 import io
 import pathlib
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,6 +17,15 @@ from ..run import Run, load, stretches
 
 NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
 LEAST_ROWS = 200
+#: slower than this a log has no row in some window of the fit; its times are rather of another unit
+LONGEST_PERIOD_S = 0.05
+_COUNTS = ("whole counts of the encoder, not revolutions or radians; sample_valid is 0 where there is no reading",
+           lambda values: (np.rint(values) == values) & (np.abs(values) < 2.0**63))
+_DUTY = 'a duty from 0 to 1', lambda values: (values >= 0) & (values <= 1)
+#: column -> what it holds, and which of its values are that
+HOLDS: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
+    'time_s': ('a time in seconds', np.isfinite), 'upper_counts': _COUNTS, 'lower_counts': _COUNTS, 'brake_pwm': _DUTY,
+    'motor_pwm': _DUTY, 'wheels_apart': ('0, or 1 where the wheels are apart', lambda values: (values == 0) | (values == 1))}
 #: half the width of the local parabola that gives first speeds, s
 HALF_WIDTH_S = 0.012
 #: a wheel stands while its count stays the same for this long before and after, s
@@ -117,6 +127,10 @@ def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
                                 float_precision='round_trip')
     except Exception as error:  # pandas raises many kinds
         raise ValueError(f'"{place}" is no CSV file of a log: {error}') from None
+    lines = text.splitlines()  # pandas fills up a short row
+    short = next((row for row, line in enumerate(lines) if line.strip() and line.count(b',') < lines[0].count(b',')), 0)
+    if short:
+        raise ValueError(f'"{place}": row {short} has {lines[short].count(b",") + 1} fields instead of {lines[0].count(b",") + 1}')
     frame.columns = [name.strip() for name in frame.columns]
     return {str(name): frame[name].to_numpy() for name in frame.columns}, notes, content
 
@@ -137,36 +151,32 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
     missing = [name for name in NEEDED if name not in columns]
     if missing:
         raise ValueError(f'the log lacks the columns {", ".join(missing)}; needed are {", ".join(NEEDED)}')
-    numbers = {}
-    for name in NEEDED:
-        try:
-            numbers[name] = np.asarray(columns[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ValueError(f'the column {name} holds texts; give numbers') from None
-    known = np.isfinite(numbers['time_s'])
-    if not known.all():
-        numbers = {name: values[known] for name, values in numbers.items()}
-        columns = {name: np.asarray(values)[known] for name, values in columns.items()}
-        notes.append(f'{int((~known).sum())} rows without a time are left out')
+    rows = len(columns['time_s'])
+    if rows < LEAST_ROWS:
+        raise ValueError(f'the log has {rows} rows; give at least {LEAST_ROWS}')
+    numbers = {'wheels_apart': np.zeros(rows), 'sample_valid': np.ones(rows)}
+    for name in ('sample_valid', *HOLDS):
+        if name in columns:
+            try:
+                numbers[name] = np.asarray(columns[name], dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ValueError(f'the column {name} holds texts; give numbers') from None
+    unread = numbers['sample_valid'] == 0
+    for name, (what, are) in HOLDS.items():
+        if not (fit := are(numbers[name]) | (unread if what is _COUNTS[0] else False)).all():
+            raise ValueError(f'{name} is {numbers[name][row := int(np.argmin(fit))]:.9g} in row {row + 1}; give {what}')
     time_s = numbers['time_s']
-    if len(time_s) < LEAST_ROWS:
-        raise ValueError(f'the log has {len(time_s)} rows; give at least {LEAST_ROWS}')
     if not (np.diff(time_s) > 0).all():
         row = int(np.argmin(np.diff(time_s))) + 1
-        raise ValueError(f'time_s does not rise at row {row}: {time_s[row - 1]:g} s, then {time_s[row]:g} s')
-    duties = {}
-    for name in ('brake_pwm', 'motor_pwm'):
-        duty = np.nan_to_num(numbers[name])
-        if duty.min() < 0 or duty.max() > 1:
-            raise ValueError(f'{name} reaches {duty.max() if duty.max() > 1 else duty.min():g}; give duties from 0 to 1')
-        duties[name] = duty
+        raise ValueError(f'time_s does not rise at row {row + 1}: {time_s[row - 1]:g} s, then {time_s[row]:g} s')
+    if (period := np.median(np.diff(time_s))) > LONGEST_PERIOD_S:
+        raise ValueError(f'time_s rises by {period:g} from row to row; give seconds (are these milliseconds?), and rows at '
+                         f'most {LONGEST_PERIOD_S} s apart')
     counts = np.stack([numbers['upper_counts'], numbers['lower_counts']], axis=1)
-    if 'sample_valid' in columns:
-        counts[np.asarray(columns['sample_valid'], dtype=float) == 0] = np.nan
+    counts[unread] = np.nan
     late = np.zeros((len(time_s), 2))
     if 'sample_time_s' in columns:
         late[:] = np.nan_to_num(np.asarray(columns['sample_time_s'], dtype=float) - time_s)[:, None]
-    apart = np.asarray(columns.get('wheels_apart', np.zeros(len(time_s))), dtype=float)
     first_counts = np.array([counts[np.isfinite(counts[:, wheel]), wheel][:1].sum() for wheel in range(2)])
     counts = np.stack([_unwrapped(counts[:, wheel]) for wheel in range(2)], axis=1)
     for wheel, name in enumerate(('upper_counts', 'lower_counts')):
@@ -174,8 +184,8 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
             raise ValueError(f'{name} never changes: the wheel stood, or its encoder is not connected')
     phase = np.asarray(columns.get('phase_name', columns.get('phase', np.full(len(time_s), ''))), dtype=object)
     name = place.resolve().name.removesuffix('.gz').removesuffix('.csv').removesuffix('.lcmlog')
-    return Log(name, place, hashlib.sha256(content).hexdigest(), time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
-               (apart != 0).astype(float), phase, late, notes, first_counts, experiment)
+    return Log(name, place, hashlib.sha256(content).hexdigest(), time_s, counts, numbers['brake_pwm'],
+               numbers['motor_pwm'], numbers['wheels_apart'], phase, late, notes, first_counts, experiment)
 
 
 def _unwrapped(counts: np.ndarray) -> np.ndarray:

@@ -129,9 +129,13 @@ def base_options(form: Form, start: PathLike) -> Any:
     return _core.PlantOptions(options(plant=start, set=given))
 
 
-def checked_keys(fixed: Mapping[str, float | None]) -> None:
-    """Raises ValueError for a key that is no parameter of any form."""
+def checked_keys(fixed: Mapping[str, float | None], start: PathLike) -> None:
+    """Raises ValueError for a key that is no parameter of any form, and for a value outside its range."""
     known = {p.key for form in FORMS.values() for p in form.parameters} | {*GIVEN, RATE_LIMIT.key}
     for key in fixed:
         if key not in known:
             raise ValueError(f'--fix {key}: no such parameter; give one of {", ".join(sorted(known))}')
+    try:
+        _core.PlantOptions(options(plant=start, set={f'plant.{key}': value for key, value in fixed.items() if value is not None}))
+    except ValueError as error:
+        raise ValueError(str(error).replace('--set: plant.', '--fix ')) from None

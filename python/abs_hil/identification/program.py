@@ -1,6 +1,7 @@
 """The command line of abs_identify, and how far it is: lines for each stage, and on a terminal one changing line with the time
 left."""
 import argparse
+import contextlib
 import json
 import pathlib
 import sys
@@ -8,13 +9,14 @@ import time
 from typing import TextIO
 
 from ..core import _core
-from ..files import refuse_existing, write_text
+from ..files import make_folder, refuse_existing, write_text, write_whole
+from ..options import whole
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import identify
 from .found import Identified
 from .parameters import FORMS
-from .results import as_json, as_toml, validate, words
+from .results import as_json, as_toml, validate, validating, words
 
 MISFIT = 1
 INTERRUPTED = 130
@@ -95,7 +97,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--out', metavar='DIR', type=pathlib.Path, default=pathlib.Path('identified'),
                       help='folder for model.toml, identified.json and report.html [identified]')
     made.add_argument('--force', action='store_true', help='replace existing files')
-    made.add_argument('--seed', metavar='N', type=int, default=1, help='seed of the bootstrap [1]')
+    made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the bootstrap [1]')
     made.add_argument('--no-report', action='store_true', help='write no page, and advise nothing')
     made.add_argument('--version', action='version', version=_core.version)
     return made
@@ -128,9 +130,11 @@ def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None
 
 def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
-    o.out.mkdir(parents=True, exist_ok=True)
+    run = validating(o.validate) if o.validate else None
+    make_folder(o.out, '--out')
     for name in ('identified.json', 'model.toml', 'report.html'):
         refuse_existing(o.out / name, '--out', o.force)
+        write_whole(o.out / name, lambda _: None, probe=True)
     if not o.no_report:
         plotly_js()  # what the page needs, before the work rather than behind it
 
@@ -140,8 +144,8 @@ def _identify(o: argparse.Namespace) -> int:
         found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say, check=progress.check)
     finally:
         progress.clear()
-    if o.validate and not (found.interrupted or found.misfit):
-        found.validation = validate(found, o.validate)
+    if run is not None and not (found.interrupted or found.misfit):
+        found.validation = validate(found, run)
         say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
             f'{found.validation["predicted_stop_distance_m"]:.5g} m')
     report = None
@@ -160,6 +164,7 @@ def _identify(o: argparse.Namespace) -> int:
 
 def main(arguments: list[str]) -> int:
     o = parser().parse_args(arguments)
+    made = [folder for folder in (o.out, *o.out.parents) if not folder.exists()]
     try:
         return _identify(o)
     except Unavailable as error:
@@ -171,3 +176,7 @@ def main(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         print('abs_identify: interrupted; nothing is written', file=sys.stderr)
         return INTERRUPTED
+    finally:
+        for folder in made:
+            with contextlib.suppress(OSError):  # it holds results
+                folder.rmdir()

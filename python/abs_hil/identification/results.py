@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from ..run import load
+from ..run import Run, load
 from ..simulation import simulate
 from .found import Estimate, Identified
 from .parameters import DELAY, FORMS, WHEELS
@@ -126,13 +126,18 @@ def plant_settings(found: Identified) -> dict[str, Any]:
     return settings
 
 
-def validate(found: Identified, folder: PathLike) -> dict[str, Any]:
-    """Simulates the run of a folder on the identified plant, with the run's own controller and model, and compares where
-    and when both stop. Raises ValueError for a folder whose configuration is unknown or that did not stop."""
+def validating(folder: PathLike) -> Run:
+    """The run of a folder. Raises ValueError for one whose configuration is unknown or that did not stop."""
     run = load(folder)
+    if not run.config or run.summary.get('stop_distance_m') is None:
+        raise ValueError(f'--validate "{folder}": a run that validates needs its summary.json, with a stop')
+    return run
+
+
+def validate(found: Identified, run: Run) -> dict[str, Any]:
+    """Simulates a run of `validating` on the identified plant, with its own controller and model, and compares where and when
+    both stop."""
     config = run.config
-    if not config or run.summary.get('stop_distance_m') is None:
-        raise ValueError(f'"{folder}": a run that validates needs its summary.json, with a stop')
     settings = {key: value for key, value in config.items() if key.startswith(_DOING) and key not in _LEFT_OUT}
     known = {row['name'] for row in _core.keys(options())}
     for key, value in config.items():  # what the controllers believed, and not the plant that is identified
@@ -145,7 +150,7 @@ def validate(found: Identified, folder: PathLike) -> dict[str, Any]:
     settings = {key: value for key, value in settings.items() if value is not None and key in known}
     predicted = simulate(controller=str(run.summary.get('controller', 'adaptive')),
                          experiment=str(run.summary.get('experiment', 'paper')), set=settings)
-    out: dict[str, Any] = {'run': str(folder)}
+    out: dict[str, Any] = {'run': str(run.folder)}
     for name in ('stop_distance_m', 'stop_time_s'):
         measured, simulated = run.summary.get(name), predicted.summary.get(name)
         out[name] = measured

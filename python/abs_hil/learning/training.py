@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core import _core
 from ..files import write_text, write_whole
+from ..options import whole
 from .rigs import TRAINING_SEED, Rigs, Task
 
 #: plants on which nobody trains
@@ -98,9 +99,9 @@ def parser() -> argparse.ArgumentParser:
                                    'trial and error, and compares it with laws of the program (docs/learning.md)')
     made.add_argument('--plant', metavar='NAME|FILE', default='paper-timing', help='nominal plant [paper-timing]')
     made.add_argument('--vary', metavar='SPEC', default=Task.vary, help=f'what varies between episodes [{Task.vary}]')
-    made.add_argument('--generations', metavar='N', type=int, default=60, help='generations of the search [60]')
-    made.add_argument('--seed', metavar='N', type=int, default=1, help='seed of the search [1]')
-    made.add_argument('--judge', metavar='N', type=int, default=100, help='plants on which the result is judged [100]')
+    made.add_argument('--generations', metavar='N', type=whole(1, 10**6), default=60, help='generations of the search [60]')
+    made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the search [1]')
+    made.add_argument('--judge', metavar='N', type=whole(1, 10**6), default=100, help='plants on which the result is judged [100]')
     made.add_argument('--output', metavar='FILE', type=pathlib.Path, help='write the weights and the curve as JSON')
     made.add_argument('--figure', metavar='FILE', type=pathlib.Path, help='draw the learning curve (SVG, PDF or PNG)')
     made.add_argument('--version', action='version', version=_core.version)
@@ -130,8 +131,10 @@ def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[
 def main(arguments: list[str]) -> int:
     o = parser().parse_args(arguments)
     try:
-        if min(o.generations, o.judge) < 1 or o.seed < 0:
-            raise ValueError('--generations, --judge: give numbers of at least 1; --seed: of at least 0')
+        if o.figure and o.figure.suffix not in ('', '.svg', '.pdf', '.png'):
+            raise ValueError(f'--figure {o.figure}: give a file .svg, .pdf or .png')
+        for path in filter(None, (o.output, o.figure)):  # no training for a result that would be lost
+            write_whole(path, lambda name: None, probe=True)
         task = Task(plant=o.plant, vary=o.vary)
 
         def progress(generation: int, reward: float) -> None:
