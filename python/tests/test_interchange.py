@@ -90,6 +90,20 @@ def test_every_value_is_that_of_the_csv(folder, tmp_path, origin, decode):
         assert np.array_equal(bits([getattr(row, field) for row in signals]), bits(expected[name][known])), name
 
 
+def test_own_names_of_phases(tmp_path):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    run = tmp_path / 'run'
+    subprocess.run([ABS_HIL, '--fast', '--no-lcm', '--experiment', 'pulses', '--out', run], check=True, stdout=subprocess.DEVNULL)
+    names = abs_hil.load(run).columns['phase_name'].tolist()
+    path = converted(run, tmp_path)
+    with open(path, 'rb') as file:
+        of_numbers = next(pytest.importorskip('mcap.reader').make_reader(file).iter_metadata()).metadata['phase_names'].split(',')
+    assert [of_numbers[int(cycle.phase_name)] for _, cycle in decoded_by_mcap_ros2(path)['/abs_hil/cycle']] == names
+    table = parquet.read_table(converted(run, tmp_path, 'run.parquet'))
+    assert table['phase_name'].to_pylist() == names
+    assert 'controller' not in json.loads(table.schema.metadata[b'abs_hil.units'])['phase_name']
+
+
 def test_names_of_fields():
     assert field_names(['theta_N', 'Theta_n', 'a__b_', 'I_m']) == {'theta_N': 'theta_n', 'Theta_n': 'theta_n_2', 'a__b_': 'a_b',
                                                                   'I_m': 'i_m'}

@@ -10,6 +10,12 @@ cmake --install "$build" --prefix "$scratch/usr" >"$scratch/install.log" || { ca
 cd "$scratch"
 usr/bin/abs_hil --backend sim --fast --no-lcm --csv run.csv >run.txt
 grep -q "completed" run.txt || { echo "the installed program's run did not complete:"; cat run.txt; exit 1; }
+# The programs in Python find their modules from wherever the prefix is.
+if [ -e usr/bin/abs_report ]; then
+  (unset PYTHONPATH; usr/bin/abs_hil report run.csv --table && usr/bin/abs_hil rig steady 2) >python.txt 2>&1 ||
+    { echo "the installed programs in Python do not run:"; cat python.txt; exit 1; }
+  grep -q "stop time" python.txt || { cat python.txt; exit 1; }
+fi
 for plant in paper-table1 paper-timing inteco-manual; do
   [ -f "usr/share/abs_hil/config/plants/$plant.toml" ] || { echo "$plant.toml is not installed"; exit 1; }
 done

@@ -15,7 +15,8 @@ import scipy.io
 
 from program import ABS_REPORT, MUST_NOT_SKIP, ReportTest
 
-EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / 'examples' / 'load_run'
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / 'examples' / 'load_run'
 
 
 class Export(ReportTest):
@@ -54,6 +55,29 @@ class Export(ReportTest):
             theta = [float(row['theta_est_N']) for row in rows]
             self.assertEqual(run['columns']['theta_est_N'], [None if math.isnan(v) else v for v in theta])
             self.assertEqual(run['summary'], self.summary(folder))
+
+    def test_each_run_keeps_its_own_columns(self):
+        runs = [*self.runs, self.make_run('steps', '--controller', 'locked', '--experiment', 'pulses')]
+        own = [list(self.rows(run)[0]) for run in runs]
+        every = list(dict.fromkeys(name for names in own for name in names))
+        self.assertTrue('zeta_N' in every and 'phase_name' in every and every not in own)
+        found = json.loads(self.report('--json', *runs).stdout)['runs']
+        self.assertEqual([list(run['columns']) for run in found], own)
+        for row in csv.DictReader(io.StringIO(self.report('--csv', *runs).stdout.decode())):
+            names = own[[run.name for run in runs].index(row['run'])]
+            self.assertEqual(list(row), ['run', *every])
+            for name in {*every} - {*names}:
+                self.assertEqual(row[name], '' if name == 'phase_name' else 'NaN')
+        self.report('--octave', *runs, '--output', 'runs.mat')
+        for run, names in zip(scipy.io.loadmat(self.folder / 'runs.mat', struct_as_record=False)['runs'][0], own):
+            self.assertEqual([name for name in every if getattr(run, name).size], names)
+        self.report('--parquet', *runs, '--output', 'runs.parquet')
+        code = ('import sys, pandas; frame = pandas.read_parquet("runs.parquet"); assert list(frame) == ["run", *sys.argv[1:]]\n'
+                'for _, part in frame.groupby("run", sort=False): print(*part.dropna(axis=1, how="all"), sep=",")')
+        python = shutil.which('python', path=ROOT / 'build' / 'python' / 'bin') or sys.executable
+        printed = subprocess.run([python, '-c', code, *every], cwd=self.folder, check=True, capture_output=True, text=True).stdout
+        known = [[name for name in names if any(row[name] != 'NaN' for row in self.rows(run))] for run, names in zip(runs, own)]
+        self.assertEqual([line.split(',')[1:] for line in printed.splitlines()], known)
 
     def test_mat_file_in_scipy(self):
         self.report('--octave', *self.runs, '--output', 'runs.mat')

@@ -61,6 +61,8 @@ class Page(ReportTest):
         self.assertEqual(labels(one, pi), ['adaptive, gamma=80', 'pi'])
         self.assertEqual(labels(one, other, third), ['gamma=80', *(f'gamma=60, {run.name}' for run in (other, third))])
         self.assertEqual(labels(other, third), [other.name, third.name], 'nothing but the folder differs')
+        step = self.make_run('steps', '--experiment', 'brake-step')
+        self.assertEqual(labels(one, step), ['paper, gamma=80', 'brake-step, gamma=21'])
         for name, seed in ((other, 2), (third, 3)):
             summary = self.summary(name)
             summary['config']['run']['seed'] = seed
@@ -272,6 +274,23 @@ class Page(ReportTest):
         shutil.copy(b / 'summary.json', a / 'summary.json')
         self.assertIn('stop_time_s: the summary says', self.page(a)[1])
 
+    def test_rows_that_miss_what_the_summary_counts_are_noticed(self):
+        a = self.make_run('a', '--set', 'telemetry.decimation=10')
+        self.assertNotIn('summary', self.page(a)[1])
+        lines = (a / 'run.csv').read_text().splitlines(keepends=True)
+        whole, cut = lines[1:], lines[1:4640]
+
+        def said(rows, **counts):
+            (a / 'run.csv').write_text(lines[0] + ''.join(rows))
+            (a / 'summary.json').write_text(json.dumps({**self.summary(a), 'telemetry_drops': 0, 'csv_rows_lost': 0, **counts}))
+            return self.page(a)[1]
+        for words in (f'the summary counts {len(whole)} cycles but the CSV has 4639 rows', 'stop_time_s, '):
+            self.assertIn(words, said(cut))
+        self.assertNotIn('cycles', said(cut, telemetry_drops=1000, csv_rows_lost=len(whole) - 5639), 'the run counted them')
+        self.assertIn('cycles', said(cut, csv_rows_lost=1))
+        self.assertIn('cycles', said([*whole, whole[-1]]), 'more rows than cycles')
+        self.assertNotIn('cycles', said(whole[::10]), 'as from its event log')
+
     def test_hostile_names_stay_text(self):
         a = self.make_run('a')
         name = '<img src=x onerror=alert(1)>\'"`touch pwned`$(touch pwned)&'
@@ -389,8 +408,13 @@ class Files(ReportTest):
         for args, says in (((self.folder / 'empty',), 'neither a run folder'), (('nowhere',), 'does not exist'),
                            ((), 'RUN'), ((a, '--window', '3:2'), '--window 3:2'), ((a, '--format', 'gif'), '--format'),
                            ((a, '--label', 'x', '--label', 'y'), '2 labels for 1 runs'),
-                           ((a, '--columns', 'slip'), '--columns')):
+                           ((a, '--columns', 'slip'), '--columns'), ((a, '--csv', '--columns', ','), '--columns names none'),
+                           ((a, '--output', 's.html', '--merits', './s.html', '--force'), 'one file for --output and --merits'),
+                           ((a, '--merits', 'report.html', '--force'), 'one file for'),
+                           ((a, '--window', '-1:-2'), '--window -1:-2')):
             self.assertIn(says, self.report(*args, status=2).stderr.decode())
+        self.assertEqual(list(self.folder.glob('*.html')), [])
+        self.report(a, '--window', '-5:1')
 
     def test_row_cut_off_by_a_crash_is_left_out_and_said(self):
         a = self.make_run('a')

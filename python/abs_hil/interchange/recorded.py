@@ -51,26 +51,30 @@ class Source:
         return self.start_ns + np.rint(self.run['time_s'] * 1e9).astype(np.int64)
 
     def numbers(self) -> dict[str, np.ndarray]:
-        """The columns of the CSV as float64; a phase is its number in abs_hil.PHASES."""
-        place = {name: float(number) for number, name in enumerate(PHASES)}
-        kept = {}
-        for name in COLUMNS:
-            values = self.run.columns[name]
-            kept[name] = np.array([place.get(phase, np.nan) for phase in values]) if name == 'phase' else values
+        """The columns of the CSV as float64; a phase is its number in abs_hil.PHASES, its own name that in `phase_names`."""
+        kept = {name: self.run.columns[name] for name in (*COLUMNS, 'phase_name') if name in self.run.columns}
+        for column, names in (('phase', PHASES), ('phase_name', self.phase_names)):
+            place = {name: float(number) for number, name in enumerate(names)}
+            if column in kept:
+                kept[column] = np.array([place.get(name, np.nan) for name in kept[column]])
         return kept
+
+    @property
+    def phase_names(self) -> list[str]:
+        return list(dict.fromkeys(self.run.columns.get('phase_name', ())))
 
     def metadata(self) -> dict[str, str]:
         names = ('controller', 'plant', 'experiment', 'backend', 'result', 'reason')
         facts = {name: str(self.run.summary[name]) for name in names if self.run.summary.get(name) is not None}
         return {'source': self.run.name, 'rows': str(len(self.run)), 'losses': '; '.join(self.losses) or 'none',
-                'phases': ','.join(PHASES), **facts}
+                'phases': ','.join(PHASES), 'phase_names': ','.join(self.phase_names), **facts}
 
 
 def comment(name: str) -> str:
     """Unit and meaning of a quantity."""
     row = QUANTITIES.get(name)
     if row is None:
-        return 'signal of the controller\'s own'
+        return 'the experiment\'s own name of the phase' if name == 'phase_name' else 'signal of the controller\'s own'
     return f'[{row["unit"]}] {row["meaning"]}' if row['unit'] else str(row['meaning'])
 
 
@@ -104,8 +108,7 @@ def _missing_rows(run: Run) -> list[str]:
         return []
     step = float(np.median(steps))
     missing = int(np.sum(np.maximum(np.rint(steps / step) - 1, 0))) if step > 0 else 0
-    late = f'{missing} rows at steps of {step * 1e3:g} ms' if missing else ''
-    return [f'gaps in time for {late} (late cycles, or lost rows)'] if missing else []
+    return [f'gaps in time for {missing} rows at steps of {step * 1e3:g} ms (late cycles, or lost rows)'] if missing else []
 
 
 def _read_folder(folder: pathlib.Path, source: Source) -> None:
@@ -167,8 +170,7 @@ def to_mcap(source: Source, name: str) -> None:
             known = ~np.all(np.isnan(np.column_stack(values)), axis=1)
             mcap.write_rows(SIGNALS_TOPIC, times_ns[known], [column[known] for column in values])
         for attached, data in source.attachments.items():
-            suffix = attached[attached.rfind('.'):]
-            mcap.attach(attached, MEDIA_TYPES[suffix], data, source.start_ns)
+            mcap.attach(attached, MEDIA_TYPES[pathlib.Path(attached).suffix], data, source.start_ns)
         mcap.describe('abs_hil', source.metadata())
         mcap.finish()
 

@@ -24,29 +24,29 @@ class Exporter:
     def __init__(self, runs: list[RunFiles], columns: list[str]) -> None:
         self.runs = runs
         self.notes: list[str] = []
-        if not columns:  # those that all runs share, in the order of the first run
-            names = [list(read_rows(run.csv).columns) for run in self.runs]
-            columns = [name for name in names[0] if all(name in other for other in names)]
-        self._columns = columns
+        self._chosen = columns
+        self._columns = columns or list(dict.fromkeys(name for run in runs for name in read_rows(run.csv).columns))
 
     def write(self, kind: str, out: BinaryIO) -> None:
         {'csv': self._csv, 'json': self._json, 'octave': self._octave, 'parquet': self._parquet}[kind](out)
 
     def _tables(self) -> Iterator[tuple[RunFiles, dict[str, np.ndarray]]]:
-        """Each run with its columns; phases as an array of names."""
+        """Each run with those of the columns that it has; phases as an array of names."""
         for run in self.runs:
             rows = read_rows(run.csv)
-            for name in self._columns:
+            for name in self._chosen:
                 if name not in rows.columns:
                     raise ValueError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.columns)}')
             if rows.truncated:
                 self.notes.append(f'{run.csv}: the last row is incomplete, as after a crash, and is left out')
-            yield run, {name: rows.columns[name] for name in self._columns}
+            yield run, {name: rows.columns[name] for name in self._chosen or rows.columns}
 
     def _csv(self, out: BinaryIO) -> None:
         for number, (run, columns) in enumerate(self._tables()):
             size = len(next(iter(columns.values())))
-            out.write(csv_bytes({'run': np.full(size, run.name, dtype=object), **columns}, header=number == 0))
+            every = {name: columns.get(name, np.full(size, '', object) if name in TEXTS else np.full(size, np.nan))
+                     for name in self._columns}
+            out.write(csv_bytes({'run': np.full(size, run.name, dtype=object), **every}, header=number == 0))
 
     def _json(self, out: BinaryIO) -> None:
         out.write(b'{"runs": [')
@@ -70,7 +70,8 @@ class Exporter:
             names = np.empty((1, len(phases)), dtype=object)
             names[0, :] = [_ascii(phase) for phase in phases]
             record['phase_names'] = names
-            for name, values in columns.items():
+            for name in self._columns:
+                values = columns.get(name, np.empty(0))
                 if name in TEXTS:
                     place = {phase: float(n) for n, phase in enumerate(phases, 1)}
                     values = np.array([place[phase] for phase in values.tolist()])
@@ -79,11 +80,7 @@ class Exporter:
 
     def _parquet(self, out: BinaryIO) -> None:
         import pandas
-        frames = []
-        for run, columns in self._tables():
-            frame = pandas.DataFrame(columns)
-            frame.insert(0, 'run', run.name)
-            frames.append(frame)
+        frames = [pandas.DataFrame({'run': run.name, **columns}) for run, columns in self._tables()]
         try:
             pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
         except ImportError:

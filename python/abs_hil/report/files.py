@@ -244,7 +244,7 @@ def _what_differs(runs: list[RunFiles]) -> list[str]:
         # What a name says, and what a model has from its plant, is not said again.
         if room in named or (room == 'model' and all(run.config.get(key) == run.config.get(f'plant.{name}') for run in runs)):
             continue
-        if key not in ('control.controller', 'run.seed'):
+        if key not in ('control.controller', 'run.seed') and not key.startswith('experiment_'):  # script, files
             keys.append(key)
     if not named and not keys:
         keys = [key for key in ('run.seed',) if key in differing_keys(runs)]

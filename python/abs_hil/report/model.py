@@ -122,10 +122,7 @@ class Figure:
 def _step_for(span: float, wanted: int) -> float:
     rough = span / wanted
     power = 10.0 ** math.floor(math.log10(rough))
-    for factor in (1.0, 2.0, 5.0):
-        if factor * power >= 0.999 * rough:
-            return factor * power
-    return 10.0 * power
+    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 0.999 * rough)
 
 
 def axis_around(low: float, high: float, wanted: int) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from .figures import Choice
 from .files import find_runs
 from .page import PAGE_MARK, Unavailable
 from .pictures import FORMATS as PICTURES
-from .report import Report, make
+from .report import make
 from .tables import Table, merits
 from .text import clean
 
@@ -25,6 +25,7 @@ _MARK_BYTES = 4096
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_report', description='Turns runs into a page with figures and tables, a plain table, '
                                    'or exports their rows', allow_abbrev=False)
+    made._negative_number_matcher = re.compile(r'-[\d.]')  # --window -5:1 has a value
     made.add_argument('runs', metavar='RUN', nargs='+',
                       help='run folders, series folders, CSV files of runs; or the folder of a study')
     made.add_argument('--version', action='version', version=_core.version)
@@ -47,13 +48,9 @@ def parser() -> argparse.ArgumentParser:
                       help='write the figures of merit as CSV, one row a run, numbers in full')
     exports = made.add_argument_group('export', 'export rows instead of a page, to --output or stdout')
     one = exports.add_mutually_exclusive_group()
-    one.add_argument('--csv', dest='export', action='store_const', const='csv',
-                     help="all runs in one CSV, with the run's name in the first column")
-    one.add_argument('--json', dest='export', action='store_const', const='json',
-                     help='runs with summaries, one array per column')
-    one.add_argument('--octave', dest='export', action='store_const', const='octave',
-                     help='MAT-file for Octave, MATLAB, SciPy')
-    one.add_argument('--parquet', dest='export', action='store_const', const='parquet', help='Parquet file')
+    for kind, what in zip(EXPORTS, ("all runs in one CSV, with the run's name in the first column", 'runs with summaries, one '
+                                    'array per column', 'MAT-file for Octave, MATLAB, SciPy', 'Parquet file')):
+        one.add_argument(f'--{kind}', dest='export', action='store_const', const=kind, help=what)
     made.add_argument('--columns', metavar='A,B', action='append', default=[],
                       help='columns to export, separated by commas (default: all)')
     return made
@@ -102,13 +99,6 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
     _say(exporter.notes)
 
 
-def _print_table(made: Report) -> None:
-    for part in made.parts['series']:
-        _print_rows(part['groups'])
-        print()
-    _print_rows(made.parts['metrics'])
-
-
 def _print_rows(table: Table) -> None:
     lines = [table.header, *table.rows]
     widths = [max(map(len, column)) for column in zip(*lines)]
@@ -125,13 +115,18 @@ def _report(o: argparse.Namespace) -> None:
         _check_replaceable(path, o.force)
     if o.merits:
         refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
+        if not o.table and path.resolve() == pathlib.Path(o.merits).resolve():
+            raise ValueError(f'"{path}" is one file for --output and --merits; give two')
     with progress_shown(sys.stderr.isatty()) as progress:
         made = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
         frame = merits(made.runs, made.surveys)
         write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))
     if o.table:
-        _print_table(made)
+        for part in made.parts['series']:
+            _print_rows(part['groups'])
+            print()
+        _print_rows(made.parts['metrics'])
     else:
         write_text(path, made.html())
     _say(made.parts['notes'])
@@ -169,6 +164,8 @@ def main(arguments: list[str]) -> int:
         if columns and not o.export:
             raise ValueError('--columns selects columns to export: also give '
                              + ', '.join(f'--{name}' for name in EXPORTS[:-1]) + f' or --{EXPORTS[-1]}')
+        if o.columns and not columns:
+            raise ValueError('--columns names none: give names of columns, or leave it out to export all')
         if o.format and not o.figures:
             raise ValueError('--format is the format of the figures: also give --figures')
         if o.export and (o.paper or o.figures or o.table or o.merits):

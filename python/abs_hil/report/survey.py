@@ -7,7 +7,7 @@ import numpy as np
 from ..core import _core
 from ..figures import FigureOfMerit, figures
 from ..rows import TEXTS, Rows
-from ..run import COLUMNS, signals_of
+from ..run import signals_of
 from .files import RunFiles
 from .text import significant
 
@@ -110,7 +110,6 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
             name = next(phase.shown for phase in reversed(found.phases) if phase.from_s <= time[first])
             found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}', figures_from(first, last)))
     found.changes = _changes(run, rows, found.r2_m)
-    assert set(COLUMNS) & found.known
     return found
 
 
@@ -168,14 +167,21 @@ def value_of(metric: FigureOfMerit, run: RunFiles, found: Survey) -> float:
 
 
 def contradictions(run: RunFiles, found: Survey) -> list[str]:
-    """Notes about figures that differ between summary and rows: then the files belong to different runs."""
+    """Notes about what differs between summary and rows: then the files belong to different runs."""
     tolerance = 1e-6  # rounding stays below it; a missing row exceeds it
-    notes = []
+    why = 'rows are missing, or the files belong to different runs'
+    notes, unknown = [], []
+    cycles, rows = run.number('cycles'), found.rows + found.truncated
+    lost = sum(run.number(name) for name in ('telemetry_drops', 'csv_rows_lost') if run.number(name) > 0)
+    every = max(1.0, run.config_number('telemetry.decimation', 1.0))
+    logged = math.ceil(cycles / every) if math.isfinite(cycles) else rows  # the CSV may be made of an event log
+    if not cycles - lost <= rows <= cycles and rows != logged:
+        notes.append(f'the summary counts {cycles:.0f} cycles but the CSV has {found.rows} rows; {why}')
     for metric in merits_shown():
         said, computed = run.number(metric.name), found.metrics[metric.name]
-        if not (math.isfinite(said) and math.isfinite(computed)):
-            continue
-        if abs(said - computed) > tolerance * max(1.0, abs(said)):
+        if math.isfinite(said) and not math.isfinite(computed):
+            unknown.append(metric.name)
+        elif abs(said - computed) > tolerance * max(1.0, abs(said)):
             notes.append(f'{metric.name}: the summary says {significant(said, 6)} but the CSV gives '
-                         f'{significant(computed, 6)}; rows are missing, or the files belong to different runs')
-    return notes
+                         f'{significant(computed, 6)}; {why}')
+    return notes + ([f'{", ".join(unknown)}: in the summary, but the CSV does not give them; {why}'] if unknown else [])

@@ -75,7 +75,7 @@ class StudyResults:
         with gzip.open(self.path, 'rb') as file, _whole(self.path):
             yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
                                        dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
-                                       keep_default_na=False,
+                                       keep_default_na=False, float_precision='round_trip',
                                        na_values={name: ['nan'] for name in [*self.factors, *self.metrics]})
 
     def columns(self, names: Sequence[str]) -> pandas.DataFrame:
