@@ -102,6 +102,7 @@ std::string fault_of_recorder(const runtime::FlightRing& recorder, std::size_t s
 
   const rig::CycleRecord& last = records.back();
   std::vector<std::string> problems;
+  std::filesystem::remove(prefix.string() + ".txt");  // of the run before; a record does not replace an older one
   telemetry::write_flight_record(
       prefix, {.records = kept, .reason = last.reason, .reason_value = last.reason_value, .account = "a test\n"}, {},
       "ABS", problems);
