@@ -344,7 +344,7 @@ def test_pieces_leave_out_rest_and_changes_of_contact(logs):
     (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0,2\n', 1), 'wheels_apart is 2 in row 1; give 0, or 1'),
     (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0\n', 1), 'row 1 has 5 fields instead of 6'),
     (lambda text: text.replace('\n0.0,', '\ninf,'), 'time_s is inf in row 1; give a time in seconds'),
-    (lambda text: text.replace('\n0.0,0,', '\n0.0,nan,'), 'upper_counts is nan in row 1; give whole counts of the encoder'),
+    (lambda text: text.replace('\n0.0,0,', '\n0.0,inf,'), 'upper_counts is inf in row 1; give whole counts of the encoder'),
     (lambda text: text.replace('\n0.0,0,', '\n0.0,1e30,'), 'upper_counts is 1e.30 in row 1; give whole counts'),
     (lambda text: text.replace('\n0.0,0,', '\n0.0,0.5,'), 'upper_counts is 0.5 in row 1; give whole counts'),
     (lambda text: re.sub(r'\n([^,]+)', lambda row: f'\n{1000 * float(row[1] or 0):.9g}', text[:-1]) + '\n',
@@ -390,8 +390,11 @@ def test_readings_that_the_rig_marks_as_lost_are_left_out():
     valid = np.arange(len(run)) % 50 != 7
     run.columns['sample_valid'] = valid.astype(float)
     run.columns['upper_counts'] = np.where(valid, run['upper_counts'], np.nan)
-    log = load_log(run)
-    assert len(log) == len(run) and (np.isnan(log.counts[:, 0]) == ~valid).all()
+    for marked in (True, False):
+        if not marked:  # an empty cell says it as well
+            del run.columns['sample_valid']
+        log = load_log(run)
+        assert len(log) == len(run) and (np.isnan(log.counts[:, 0]) == ~valid).all()
 
 
 @pytest.mark.parametrize(('given', 'words'), [

@@ -7,7 +7,7 @@
 
 namespace abs_hil::config {
 
-/// A text that may hold anything, fit for a terminal: control characters but the line's end as \\xNN, and not too long.
+/// A text that may hold anything, fit for a terminal: control characters but the line's end as \xNN, and not too long.
 [[nodiscard]] inline std::string printable(const std::string& text) {
   constexpr std::size_t most = 4000;
   std::string shown;

@@ -19,8 +19,8 @@ NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
 LEAST_ROWS = 200
 #: slower than this a log has no row in some window of the fit; its times are rather of another unit
 LONGEST_PERIOD_S = 0.05
-_COUNTS = ("whole counts of the encoder, not revolutions or radians; sample_valid is 0 where there is no reading",
-           lambda values: (np.rint(values) == values) & (np.abs(values) < 2.0**63))
+_COUNTS = ("whole counts of the encoder, not revolutions or radians; the cell is empty, or sample_valid 0, without a reading",
+           lambda values: np.isnan(values) | (np.rint(values) == values) & (np.abs(values) < 2.0**63))
 _DUTY = 'a duty from 0 to 1', lambda values: (values >= 0) & (values <= 1)
 #: column -> what it holds, and which of its values are that
 HOLDS: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {

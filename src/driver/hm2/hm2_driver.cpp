@@ -24,8 +24,8 @@ constexpr std::uint32_t unbuffered_12_bit = 0x03;
 constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
 constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
 constexpr std::uint32_t filter_at_25_MHz = 2;
-constexpr std::uint16_t usual_direction =
-    0x1100;  // register 1 of the ports at base 0x1000, in all firmware known to us
+/// Register 1 of the ports at base 0x1000, in all firmware known to us.
+constexpr std::uint16_t usual_direction = 0x1100;
 
 std::uint32_t pwm_rate(const Hm2Options& options, const Board& board) {
   constexpr double rate_steps = 65536.0;
