@@ -24,7 +24,7 @@
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "files/result_file.hpp"
-#include "run_folder/clean_text.hpp"
+#include "rig/clean_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
@@ -58,7 +58,7 @@ class LogColumns {
   }
   py::tuple result(const std::string& damage) {
     for (std::string& text : experiment_) {
-      if (&text != &experiment_.back()) text = run_folder::clean_text(text);
+      if (&text != &experiment_.back()) text = rig::clean_text(text);
     }
     const std::size_t rows = columns_.rows();
     // The configuration is JSON, as bytes: it may be damaged.
@@ -77,7 +77,7 @@ class LogColumns {
     if (phases_.size() <= place) phases_.resize(place + 1);
     rig::NamedPhase& named = phases_[place];
     if (named.name.empty()) {
-      named = {static_cast<rig::Phase>(message.phase), run_folder::clean_text(message.phase_name)};
+      named = {static_cast<rig::Phase>(message.phase), rig::clean_text(message.phase_name)};
     }
   }
   template <class Message>
@@ -252,9 +252,7 @@ void add_files(py::module_& module) {
   module.def("profile_of", &profile_of, py::arg("text"), py::arg("key"));
   module.def(
       "clean_text",
-      [](const py::bytes& text, std::size_t most) {
-        return run_folder::clean_text(static_cast<std::string>(text), most);
-      },
+      [](const py::bytes& text, std::size_t most) { return rig::clean_text(static_cast<std::string>(text), most); },
       py::arg("text"), py::arg("most_characters") = 200);
   module.def("is_signal_name", [](const std::string& name) { return rig::is_signal_name(name); });
   module.def(

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <type_traits>
 
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::cli {
@@ -43,12 +44,6 @@ void limit_values(CLI::Option& option, const Option& row) {
   if (!row.words.empty()) option.transform(CLI::CheckedTransformer(row.words));
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
-  return text;
-}
-
 /// The first word that the command line should not have, and the valid one that is nearest to it.
 std::string unexpected(const CLI::App& program) {
   const CLI::App* app = &program;
@@ -69,7 +64,7 @@ std::string unexpected(const CLI::App& program) {
     if (!subcommand->get_name().empty()) names.push_back(subcommand->get_name());
   }
   if (names.empty() || !app->get_subcommands().empty()) return "unexpected argument " + word;
-  return "unknown subcommand " + word + rig::nearest_hint(word, names) + "; known: " + joined(names);
+  return "unknown subcommand " + word + rig::nearest_hint(word, names) + "; known: " + rig::joined(names);
 }
 
 }  // namespace

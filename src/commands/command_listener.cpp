@@ -11,7 +11,7 @@
 #include <cstring>
 #include <utility>
 
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_url.hpp"
 
@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t packets_per_poll = 32;
 constexpr std::size_t most_waiting = 64;
 constexpr int answers_per_second = 10;
-constexpr std::size_t shown_text_max_bytes = 64;
+constexpr std::size_t shown_text_max_characters = 64;
 constexpr int thread_wait_ms = 50;
 constexpr std::chrono::seconds reconnect_after{1};
 constexpr int tcpq_timeout_ms = 200;
@@ -191,7 +191,7 @@ void CommandListener::answer(const Arrival& arrival) {
                false);
   }
   const auto& command = std::get<command_t>(arrival);
-  const std::string from = " (sender '" + rig::printable(command.sender, shown_text_max_bytes) + "')";
+  const std::string from = " (sender '" + rig::clean_text(command.sender, shown_text_max_characters) + "')";
   if (command.command == "stop") {
     ++stops_answered_;
     return say(rig::Reason::stop_command, "stop accepted" + from, stops_answered_, stops_answered_ == 1);
@@ -199,7 +199,7 @@ void CommandListener::answer(const Arrival& arrival) {
   const std::optional<CommandAnswer> judged =
       judge_ ? judge_(command)
              : CommandAnswer{rig::Reason::commands_not_enabled,
-                             "refused '" + rig::printable(command.command, shown_text_max_bytes) +
+                             "refused '" + rig::clean_text(command.command, shown_text_max_characters) +
                                  "': only 'stop' is accepted, as this run has commands.enabled = false"};
   if (!judged) return;
   ++refused_;

@@ -7,20 +7,20 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 
 namespace abs_hil::commands {
 
 namespace {
 
 constexpr double state_period_s = 0.5;
-constexpr std::size_t shown_max_bytes = 64;
+constexpr std::size_t shown_max_characters = 64;
 constexpr std::string_view start_name = "start";
 constexpr std::string_view continue_name = "continue";
 
 bool has_value(const std::string& key) { return key != start_name && key != continue_name; }
 
-std::string shown(const std::string& text) { return rig::printable(text, shown_max_bytes); }
+std::string shown(const std::string& text) { return rig::clean_text(text, shown_max_characters); }
 
 std::string why(rig::Reason reason) {
   switch (reason) {

@@ -13,7 +13,7 @@
 #include "abs_hil/rig/reason.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "commands/authority.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_codec.hpp"
@@ -109,7 +109,7 @@ Reply reply_of(const Answers& answers) {
     return {Outcome::no_answer,
             "no authentic answer; one without this key's tag came, from a run with another key or "
             "none, or from a forger: " +
-                rig::printable(answers.without_tag->message, 300)};
+                rig::clean_text(answers.without_tag->message, 300)};
   }
   if (!answer) {
     return {
@@ -169,7 +169,7 @@ Reply send(const Order& order, const SenderOptions& options) {
   // The program publishes why the run ended before it refuses the pending commands.
   if (!answered() && answers.ending) answers.wait(std::min(end, Clock::now() + last_words), answered);
   if (!answered() && answers.ending) {
-    return {Outcome::refused, "no answer, because the run ended: " + rig::printable(answers.ending->message, 200)};
+    return {Outcome::refused, "no answer, because the run ended: " + rig::clean_text(answers.ending->message, 200)};
   }
   return reply_of(answers);
 }

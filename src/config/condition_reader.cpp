@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "config/reader.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 
@@ -107,14 +108,9 @@ When TableReader::when(const Entry& entry) const {
   for (const std::string_view operation : {"!=", "<=", ">=", "=", "<", ">"}) {
     const std::size_t found = all.find(operation);
     if (found == std::string::npos) continue;
-    const auto trimmed = [](std::string_view part) {
-      while (part.starts_with(' ')) part.remove_prefix(1);
-      while (part.ends_with(' ')) part.remove_suffix(1);
-      return std::string(part);
-    };
     const std::string_view view = all;
-    When when{trimmed(view.substr(0, found)), std::string(operation), trimmed(view.substr(found + operation.size())),
-              entry.place};
+    When when{std::string(rig::trimmed(view.substr(0, found))), std::string(operation),
+              std::string(rig::trimmed(view.substr(found + operation.size()))), entry.place};
     const Key& key = source_.key(when.key, entry.place);
     source_.check_value(when.key, parse_value(key, when.value), entry.place);
     const bool ordered =

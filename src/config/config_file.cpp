@@ -37,6 +37,12 @@ toml::table parse(const fs::path& file) {
   }
 }
 
+bool is_table(const std::string& name) {
+  Settings settings;
+  const KeyTable keys(settings);
+  return std::ranges::any_of(keys.keys(), [&](const Key& key) { return key.name.starts_with(name + '.'); });
+}
+
 void collect(const toml::table& table, const std::string& prefix, const fs::path& file,
              std::vector<FileValue>& values) {
   for (const auto& [key, node] : table) {
@@ -44,6 +50,8 @@ void collect(const toml::table& table, const std::string& prefix, const fs::path
     const std::string origin = fmt::format("{}:{}", file.string(), node.source().begin.line);
     if (const auto* inner = node.as_table()) {
       collect(*inner, name, file, values);
+      // An empty table sets nothing, so that no key's check would notice a misspelled name.
+      if (inner->empty() && !is_table(name)) values.push_back({name, std::string(), origin});
     } else if (const auto* text = node.as_string()) {
       values.push_back({name, text->get(), origin});
     } else if (const auto* flag = node.as_boolean()) {

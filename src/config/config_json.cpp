@@ -55,13 +55,4 @@ void load_tables(std::string_view text, std::initializer_list<const char*> table
   throw ConfigError(std::string(origin) + ": " + error.what());
 }
 
-bool is_utf8(const std::string& text) {
-  try {
-    static_cast<void>(nlohmann::json(text).dump());
-    return true;
-  } catch (const nlohmann::json::type_error&) {
-    return false;
-  }
-}
-
 }  // namespace abs_hil::config

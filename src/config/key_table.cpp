@@ -12,6 +12,8 @@
 
 #include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
+#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::config {
@@ -39,12 +41,6 @@ std::string nearest_of(const Key& key, const std::string* text) {
   const std::string_view nearest = text == nullptr ? "" : rig::nearest_name(*text, key.allowed.list());
   if (nearest.empty() || 2 * rig::edit_distance(*text, nearest) > text->size()) return {};
   return fmt::format(", nearest to it {}", nearest);
-}
-
-std::string_view trimmed(std::string_view text) {
-  while (text.starts_with(' ')) text.remove_prefix(1);
-  while (text.ends_with(' ')) text.remove_suffix(1);
-  return text;
 }
 
 template <typename Number>
@@ -215,7 +211,7 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
           if (text == nullptr || !key.allows(*text)) {
             refuse(key, value_text(value), rig::valid_name_text(key) + nearest_of(key, text), origin);
           }
-          if (!is_utf8(*text)) {
+          if (!rig::is_utf8(*text)) {
             throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
           }
           *target = *text;
@@ -234,7 +230,7 @@ std::pair<std::string_view, std::string_view> split_assignment(std::string_view 
     throw ConfigError(
         fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
   }
-  return {trimmed(assignment.substr(0, equals)), trimmed(assignment.substr(equals + 1))};
+  return {rig::trimmed(assignment.substr(0, equals)), rig::trimmed(assignment.substr(equals + 1))};
 }
 
 void KeyTable::set_text(std::string_view assignment, std::string_view origin) {

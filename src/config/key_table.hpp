@@ -99,7 +99,4 @@ class KeyTable {
 void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
                  std::string_view origin);
 
-/// Texts of settings and command lines are written to JSON (summary, logs), which is UTF-8.
-[[nodiscard]] bool is_utf8(const std::string& text);
-
 }  // namespace abs_hil::config

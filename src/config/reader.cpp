@@ -7,6 +7,7 @@
 
 #include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 
@@ -126,17 +127,7 @@ std::string shown(const toml::node& node) {
     node.visit([&stream](const auto& value) { stream << value; });
     text = stream.str();
   }
-  // A message is one line of UTF-8.
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) == 0x7F) c = ' ';
-  }
-  if (text.size() > longest_shown) {
-    std::size_t end = longest_shown;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-    text.resize(end);
-    text += "...";
-  }
-  return text;
+  return rig::clean_text(text, longest_shown);
 }
 
 TableReader::TableReader(const Source& source, const toml::table& table, const Grammar& grammar, Place place)

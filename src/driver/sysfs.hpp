@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <vector>
 
 namespace abs_hil::driver {
 
@@ -25,12 +24,6 @@ namespace abs_hil::driver {
 /// The number that a file begins with; 0 if it cannot be read. Base 16 allows "0x10b5" as well as "10b5".
 [[nodiscard]] inline std::uint32_t number_in(const std::filesystem::path& file, int base) {
   return static_cast<std::uint32_t>(std::strtoul(line_in(file).c_str(), nullptr, base));
-}
-
-[[nodiscard]] inline std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace abs_hil::driver

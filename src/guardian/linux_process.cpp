@@ -15,7 +15,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/sysfs.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 
 namespace abs_hil::guardian {
 
@@ -64,7 +64,7 @@ bool send_signal(int pidfd, int signal) noexcept {
 
 std::string name_of_process(pid_t pid) {
   const std::string name = driver::process_name(pid);
-  return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + rig::printable(name, 64) + ")");
+  return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + rig::clean_text(name, 64) + ")");
 }
 
 pid_t process_of(int pidfd) {

@@ -12,7 +12,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "guardian/linux_process.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 
 namespace abs_hil::guardian {
 
@@ -181,7 +181,7 @@ void Talker::refuse(Client& client, const std::string& why) {
 std::string Talker::why_no_lease(const LeaseMessage& asked, const Peer& peer) const {
   if (peer.pid <= 0) return "the pidfd is not that of the process that asks";
   if (asked.text != parts_.board) {
-    return "it keeps " + parts_.board + ", and the run wants " + rig::printable(asked.text, longest_shown) +
+    return "it keeps " + parts_.board + ", and the run wants " + rig::clean_text(asked.text, longest_shown) +
            "; name that board's service with guardian.socket, or give both the same driver.* keys";
   }
   for (const Interruption& i : parts_.interruptions) {
@@ -228,7 +228,7 @@ void Talker::cover(Client& client, const LeaseMessage& message) {
     held_->terms = std::move(terms);
     order({.word = OrderWord::cover, .lease = held_->lease, .timeout_ns = held_->terms.timeout_ns});
   } catch (const std::exception& error) {
-    const std::string why = rig::printable(error.what(), longest_shown);  // it may quote what the client sent
+    const std::string why = rig::clean_text(error.what(), longest_shown);  // it may quote what the client sent
     parts_.tell("does not guard " + held_->name + ": " + why);
     static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = why}));
   }

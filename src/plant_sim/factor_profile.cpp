@@ -8,6 +8,7 @@
 #include <string>
 
 #include "abs_hil/plant_sim/drift.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {
@@ -18,23 +19,17 @@ constexpr double highest_factor = 10.0;
   throw std::invalid_argument("\"" + std::string(part) + "\" " + problem);
 }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
 /// Removes and returns the text before `separator` from `rest`; all of it if there is no separator.
 std::string_view cut(std::string_view& rest, char separator) {
   const std::size_t at = rest.find(separator);
   const std::string_view head = rest.substr(0, at);
   rest = at == std::string_view::npos ? std::string_view{} : rest.substr(at + 1);
-  return trimmed(head);
+  return rig::trimmed(head);
 }
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
-  while (!(text = trimmed(text)).empty()) words.push_back(cut(text, ' '));
+  while (!(text = rig::trimmed(text)).empty()) words.push_back(cut(text, ' '));
   return words;
 }
 
@@ -86,9 +81,9 @@ FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes a
 }
 
 void FactorProfile::read(std::string_view text, Axes axes) {
-  if (trimmed(text).empty()) return;
+  if (rig::trimmed(text).empty()) return;
   const bool time_only = axes == Axes::time_only;
-  const std::string_view whole = trimmed(text);
+  const std::string_view whole = rig::trimmed(text);
   if (whole.find(':') == std::string_view::npos) {
     refuse(whole, time_only ? "names no axis; begin with \"time:\" or \"braking time:\""
                             : "names no axis; begin with \"time:\", \"distance:\", \"braking time:\" or "
@@ -107,7 +102,7 @@ void FactorProfile::read(std::string_view text, Axes axes) {
   const std::string_view first = cut(rest, ';');
   pieces_.front().value = factor(first, first);
   double jumped_at = 0.0;
-  while (!trimmed(rest).empty()) {
+  while (!rig::trimmed(rest).empty()) {
     const std::string_view part = cut(rest, ';');
     const Change next = change(part);
     Piece& last = pieces_.back();

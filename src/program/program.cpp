@@ -23,7 +23,7 @@
 #include "interchange/foreign_controller.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "run_folder/clean_text.hpp"
+#include "rig/clean_text.hpp"
 #include "runtime/early_end.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
@@ -98,9 +98,9 @@ int with_stdout(int status) {
 /// The command line is part of a run's record. A path that is no text would fail there, after the run.
 void refuse_odd_bytes(int argc, char** argv) {
   for (int n = 1; n < argc; ++n) {
-    if (config::is_utf8(argv[n])) continue;
+    if (rig::is_utf8(argv[n])) continue;
     throw config::ConfigError(fmt::format("argument {} (\"{}\") is not UTF-8 text; give names and paths in UTF-8", n,
-                                          run_folder::clean_text(argv[n])));
+                                          rig::clean_text(argv[n])));
   }
 }
 

@@ -21,7 +21,7 @@
 #include "program/questions.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 #include "run_folder/series_folder.hpp"
 #include "study/parallel.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -141,7 +141,7 @@ class StopListener {
     const config::CommandOptions& commands = run.settings.commands;
     if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
     commands_.set_judge([](const command_t& command) {
-      const std::string shown = rig::printable(command.command, 64);
+      const std::string shown = rig::clean_text(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,
                                       "refused '" + shown + "': only stop is accepted between two runs of a series"};
     });

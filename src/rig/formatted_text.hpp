@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace abs_hil::rig {
 
@@ -16,15 +18,18 @@ template <typename... Values>
   return text;
 }
 
-/// `text` of somebody else for logs and terminals: at most `max_bytes`, with '?' for control and non-ASCII bytes, so
-/// that it writes no line of ours. Not real-time safe.
-[[nodiscard]] inline std::string printable(std::string_view text, std::size_t max_bytes) {
-  std::string clean(text.substr(0, max_bytes));
-  for (char& c : clean) {
-    if (c < 0x20 || c > 0x7e) c = '?';
-  }
-  if (text.size() > max_bytes) clean += "...";
-  return clean;
+/// `text` without the blanks at both ends.
+[[nodiscard]] inline std::string_view trimmed(std::string_view text) noexcept {
+  constexpr std::string_view blanks = " \t";
+  text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
+  return text.substr(0, text.find_last_not_of(blanks) + 1);
+}
+
+/// The words with commas between them.
+[[nodiscard]] inline std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
+  return text;
 }
 
 }  // namespace abs_hil::rig

@@ -8,6 +8,7 @@
 #include "abs_hil/control/registry.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "rig/formatted_text.hpp"
 #include "study/study_script.hpp"
 
 namespace abs_hil::study {
@@ -58,11 +59,6 @@ bool read_file(Contender& contender, config::KeyTable& keys, const std::string& 
   return named;
 }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
-  return text.substr(begin, text.find_last_not_of(' ') + 1 - begin);
-}
-
 /// Reads what stands between the braces: KEY=VALUE and files, with commas between them.
 void read_changes(Contender& contender, std::string_view changes, const std::string& entry) {
   config::KeyTable keys(contender.settings);
@@ -78,8 +74,9 @@ void read_changes(Contender& contender, std::string_view changes, const std::str
     if (equals == std::string_view::npos) {
       refuse(entry, fmt::format("\"{}\": give KEY=VALUE or a TOML file, as in adaptive{{gamma=60}}", change));
     }
-    const std::string name = full_name(keys, trimmed(change.substr(0, equals)), contender.settings.control.controller);
-    const std::string_view text = trimmed(change.substr(equals + 1));
+    const std::string name =
+        full_name(keys, rig::trimmed(change.substr(0, equals)), contender.settings.control.controller);
+    const std::string_view text = rig::trimmed(change.substr(equals + 1));
     const config::Key* key = config::find_key(keys.keys(), name);
     if (key != nullptr) check_key(entry, name);
     set(contender, keys, name, key == nullptr ? config::Value(std::string(text)) : config::parse_value(*key, text),

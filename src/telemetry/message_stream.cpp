@@ -9,7 +9,7 @@
 
 #include "abs_hil/adjustment_t.hpp"
 #include "files/result_file.hpp"
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/reason_text.hpp"
 
 namespace abs_hil::telemetry {
@@ -59,7 +59,7 @@ void check_channel_prefix(std::string_view prefix) {
     return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
   };
   if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
-    throw std::invalid_argument("channel prefix '" + rig::printable(prefix, 80) +
+    throw std::invalid_argument("channel prefix '" + rig::clean_text(prefix, 80) +
                                 "' is not valid; give at most 48 letters, digits, '_', '-' and '/'");
   }
 }

@@ -55,7 +55,7 @@ TEST_CASE("stop is accepted from any sender and answered") {
   REQUIRE(answers.size() == 1);
   CHECK(answers[0].kind == "command");
   CHECK(answers[0].reason == static_cast<int>(rig::Reason::stop_command));
-  CHECK(answers[0].message == "stop accepted (sender 'tok?1')");
+  CHECK(answers[0].message == "stop accepted (sender 'tok\uFFFD1')");
   CHECK(answers[0].stamp_ns == test::sample_record(0).stamp_ns);
 }
 

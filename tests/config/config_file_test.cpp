@@ -62,6 +62,8 @@ TEST_CASE("errors in a file name file and line") {
   CHECK_THAT(load_error("[plant]\nx="), Contains(".toml:2") && Contains("not valid TOML"));
   CHECK_THAT(load_error("[plant]\ntheta_N = [1, 2]\n"), Contains("neither a number"));
   CHECK_THAT(load_error("[plant]\ntheta_N = nan\n"), Contains("theta_N"));
+  CHECK_THAT(load_error("[plant]\n[contrl]\n"), Contains(".toml:2") && Contains("contrl"));
+  CHECK(load_error("[control]\n[control.adaptive]\n").empty());
 }
 
 TEST_CASE("a plant file with another table is refused") {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "rig/formatted_text.hpp"
+#include "rig/clean_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/udpm_receiver.hpp"
@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span<const std::uint8_t> raw(data, size);
   command_t command{};
   if (telemetry::decode_checked(raw, command).empty() && command.command.size() > size) std::abort();
-  static_cast<void>(rig::printable(command.sender, 64));
+  static_cast<void>(rig::clean_text(command.sender, 64));
 
   // As it came, and behind each magic word, which chance does not pass either.
   for (const char magic : {'\0', '2', '3'}) {

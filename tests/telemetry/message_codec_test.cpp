@@ -8,7 +8,6 @@
 
 #include "abs_hil/command_t.hpp"
 #include "catch.hpp"
-#include "rig/formatted_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
@@ -228,11 +227,6 @@ TEST_CASE("a string with a NUL inside is encoded as far as it goes and decodes a
   const auto result = decoded_command(bytes_of(command));
   CHECK(result.problem.empty());
   CHECK(result.command.sender == "a");
-}
-
-TEST_CASE("text from the network is made fit to print") {
-  CHECK(rig::printable("stop\n\x1b[2J\xce", 64) == "stop??[2J?");
-  CHECK(rig::printable("abcdef", 3) == "abc...");
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ std::string choose(const PciOptions& options) {
            ". To run without the rig, use --backend sim");
   }
   if (cards.size() > 1) {
-    refuse(std::to_string(cards.size()) + " cards in " + options.root + ": " + joined(cards) +
+    refuse(std::to_string(cards.size()) + " cards in " + options.root + ": " + rig::joined(cards) +
            "; choose one with --set driver.pci.bdf=" + cards.front());
   }
   return cards.front();

@@ -77,7 +77,7 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
   if (boards.size() > 1) {
     std::vector<std::string> all;
     for (const UsbDevice& board : boards) all.push_back(board.text());
-    refuse(std::to_string(boards.size()) + " boards: " + joined(all) +
+    refuse(std::to_string(boards.size()) + " boards: " + rig::joined(all) +
            "; choose one with --set driver.usb.serial=" + boards.front().serial);
   }
   const UsbDevice& board = boards.front();

@@ -1,9 +1,10 @@
 // Makes bytes from elsewhere fit to show: valid UTF-8 without control characters.
-#include "run_folder/clean_text.hpp"
+#include "rig/clean_text.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
-namespace abs_hil::run_folder {
+namespace abs_hil::rig {
 
 namespace {
 
@@ -47,17 +48,27 @@ bool is_control(std::string_view character) {
 
 }  // namespace
 
-std::string clean_text(std::string_view text, std::size_t most_characters) {
+std::string clean_text(std::string_view text, std::size_t most_characters, std::string_view kept) {
   std::string clean;
   std::size_t characters = 0;
   while (!text.empty()) {
     if (characters++ == most_characters) return clean + "\u2026";
     const std::size_t bytes = character_bytes(text);
     const std::string_view character = text.substr(0, std::max<std::size_t>(bytes, 1));
-    clean += bytes == 0 || is_control(character) ? replacement : character;
+    const bool shown = bytes > 0 && (!is_control(character) || kept.find(character) != kept.npos);
+    clean += shown ? character : replacement;
     text.remove_prefix(character.size());
   }
   return clean;
 }
 
-}  // namespace abs_hil::run_folder
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t bytes = character_bytes(text);
+    if (bytes == 0) return false;
+    text.remove_prefix(bytes);
+  }
+  return true;
+}
+
+}  // namespace abs_hil::rig

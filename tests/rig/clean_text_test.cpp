@@ -1,9 +1,9 @@
 // Text from elsewhere is cleaned before it goes into a file.
-#include "run_folder/clean_text.hpp"
+#include "rig/clean_text.hpp"
 
 #include "catch.hpp"
 
-using namespace abs_hil::run_folder;
+using namespace abs_hil::rig;
 
 TEST_CASE("Cleaned text is valid UTF-8 without control characters") {
   CHECK(clean_text("Acosta-Lúa θ̂") == "Acosta-Lúa θ̂");
@@ -14,4 +14,11 @@ TEST_CASE("Cleaned text is valid UTF-8 without control characters") {
   CHECK(clean_text("\xe2\x80\xae"
                    "evil") == "\uFFFDevil");  // right-to-left override
   CHECK(clean_text("ααααα", 3) == "ααα…");
+  CHECK(clean_text("a\n\tb", 9, "\n") == "a\n\uFFFDb");
+}
+
+TEST_CASE("Text is UTF-8 or not, control characters or none") {
+  CHECK(is_utf8(""));
+  CHECK(is_utf8("θ̂\n\x1b"));
+  for (const char* text : {"\xff", "a\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80"}) CHECK_FALSE(is_utf8(text));
 }
