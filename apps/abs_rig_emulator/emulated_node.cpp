@@ -169,7 +169,8 @@ std::span<const ControlRow<EmulatedNode>> EmulatedNode::rows() {
   using Command = ControlCommand;
   static constexpr std::array<ControlRow<Node>, 7> all{{
       {"fault NAME[=NUMBER]",
-       "ok silent deaf drop= no-status stale= ahead= stuck duplicate swapped wrong-size= corrupt nonsense babble=",
+       "ok silent deaf no-deactivate drop= no-status no-outputs stale= ahead= stuck duplicate swapped wrong-size= "
+       "corrupt nonsense babble=",
        [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
       {"restart", "the node is switched off and on: inactive, its clock at 0",
        [](Node& node, const Command&) { node.power_on(); }},

@@ -115,20 +115,22 @@ class CanNode final : public RigBehind {
 
 /// Faults of a node and of its bus. The names are those of the control command `fault NAME[=NUMBER]`.
 enum class NodeFaultKind : std::uint8_t {
-  ok,          ///< no fault: heals the node
-  silent,      ///< sends nothing
-  deaf,        ///< takes no command, but answers
-  drop,        ///< the next NUMBER answers are lost, then ok
-  no_status,   ///< STATUS and OUTPUTS are never sent
-  stale,       ///< sequences NUMBER behind
-  ahead,       ///< sequences NUMBER ahead
-  stuck,       ///< repeats the answer that it gave when the fault began
-  duplicate,   ///< sends every frame twice
-  swapped,     ///< ends its answer with the counters instead of their time
-  wrong_size,  ///< frames are NUMBER bytes long
-  corrupt,     ///< wrong checksums
-  nonsense,    ///< random counters
-  babble,      ///< NUMBER frames of other identifiers and as many forged ones of its own before each answer
+  ok,             ///< no fault: heals the node
+  silent,         ///< sends nothing
+  deaf,           ///< takes no command, but answers
+  no_deactivate,  ///< is never told to deactivate
+  drop,           ///< the next NUMBER answers are lost, then ok
+  no_status,      ///< STATUS is never sent
+  no_outputs,     ///< OUTPUTS is never sent
+  stale,          ///< sequences NUMBER behind
+  ahead,          ///< sequences NUMBER ahead
+  stuck,          ///< repeats the answer that it gave when the fault began
+  duplicate,      ///< sends every frame twice
+  swapped,        ///< ends its answer with the counters instead of their time
+  wrong_size,     ///< frames are NUMBER bytes long
+  corrupt,        ///< wrong checksums
+  nonsense,       ///< random counters
+  babble,         ///< NUMBER frames of other identifiers and as many forged ones of its own before each answer
 };
 
 /// Applies a fault between a node and its bus.

@@ -11,11 +11,13 @@ namespace abs_hil::emulator {
 namespace {
 
 // In the order of NodeFaultKind.
-constexpr std::array<FaultName, 14> node_faults{{{"ok"},
+constexpr std::array<FaultName, 16> node_faults{{{"ok"},
                                                  {"silent"},
                                                  {"deaf"},
+                                                 {"no-deactivate"},
                                                  {"drop=ANSWERS", 0, 100'000, true},
                                                  {"no-status"},
+                                                 {"no-outputs"},
                                                  {"stale=N", 0, 127, true},
                                                  {"ahead=N", 0, 127, true},
                                                  {"stuck"},
@@ -49,7 +51,12 @@ void NodeFaults::set(std::string_view text) {
 }
 
 bool NodeFaults::hears(const BusFrame& frame) const noexcept {
-  return kind_ != NodeFaultKind::deaf || frame.id != 0x81;
+  constexpr std::uint8_t deactivate = 3;
+  switch (kind_) {
+    case NodeFaultKind::deaf: return frame.id != 0x81;
+    case NodeFaultKind::no_deactivate: return frame.id != 0x82 || frame.data[0] != deactivate;
+    default: return true;
+  }
 }
 
 void NodeFaults::prepend_babble(std::vector<BusFrame>& frames) {
@@ -80,7 +87,8 @@ std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
         --number_;
       }
       break;
-    case no_status: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x90 || f.id == 0x91; }); break;
+    case no_status: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x90; }); break;
+    case no_outputs: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x91; }); break;
     case stale:
       for (BusFrame& frame : frames) shift_sequence(frame, 256U - number_);
       break;
@@ -113,7 +121,8 @@ std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
       break;
     case babble: prepend_babble(frames); break;
     case ok:
-    case deaf: break;
+    case deaf:
+    case no_deactivate: break;
   }
   return frames;
 }

@@ -163,6 +163,7 @@ void Run::begin() {
 
 rig::Reason Run::end_reason() const noexcept {
   const rig::Reason reason = logic_.end_reason();
+  if (reason == rig::Reason::sequence_complete && !safe_state_.ok()) return rig::Reason::safe_state_unverified;
   const bool moves_on = reason == rig::Reason::sequence_complete && prepared_.to_stop && metrics_.moves_on();
   return moves_on ? rig::Reason::braking_without_stop : reason;
 }

@@ -23,15 +23,17 @@ namespace abs_hil::runtime {
 
 namespace {
 
-/// This program, and the guardian beside it: a guardian with fewer rights than its controller is refused.
-std::string program_paths() {
+/// setcap's words for this program and the guardian beside it: a guardian with fewer rights than its controller is
+/// refused. setcap takes the capabilities anew before each file.
+std::string capabilities_for_programs() {
+  const auto words = [](const std::string& path) { return "cap_sys_nice,cap_ipc_lock+ep \"" + path + '"'; };
   std::array<char, 4096> path{};
   const ssize_t size = ::readlink("/proc/self/exe", path.data(), path.size());
-  if (size <= 0) return "$(command -v abs_hil) $(command -v abs_guardian)";
+  if (size <= 0) return words("$(command -v abs_hil)") + ' ' + words("$(command -v abs_guardian)");
   const std::string program(path.data(), static_cast<std::size_t>(size));
   const std::string guardian = program.substr(0, program.rfind('/') + 1) + "abs_guardian";
   const bool has_guardian = guardian != program && ::access(guardian.c_str(), F_OK) == 0;
-  return has_guardian ? program + " " + guardian : program;
+  return has_guardian ? words(program) + ' ' + words(guardian) : words(program);
 }
 
 /// Shell commands that permit this program SCHED_FIFO and locked memory permanently.
@@ -39,8 +41,8 @@ std::string privilege_fix() {
   return "sudo groupadd -f realtime && sudo usermod -aG realtime $USER\n"
          "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee "
          "/etc/security/limits.d/99-realtime.conf   # then log in again\n"
-         "or, for these programs alone: sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
-         program_paths();
+         "or, for these programs alone: sudo setcap " +
+         capabilities_for_programs();
 }
 
 /// The same commands, and fixes for other causes that keep the scheduler from granting `priority`.

@@ -133,6 +133,15 @@ class CanRun(CanTest):
                 node.command('fault ok')
                 self.assertEqual(node.wire(), SAFE)
 
+    def test_a_run_without_a_verified_safe_state_has_not_completed(self):
+        node = self.node('--lock-step', '--start-speed', 60, '--fault', 'no-deactivate')
+        summary = self.folder / 'summary.json'
+        result = self.lock_step(node, '--summary', summary, '--set', 'experiment.cut_speed_rad_s=70')
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('the safe state may not have reached the board', result.stderr)
+        self.assertEqual(self.summary(summary)['result'], 'fault')
+        self.assertIn('could not verify the safe state', self.summary(summary)['reason'])
+
     def test_fast_needs_lock_step_and_real_time_its_own_time(self):
         node = self.node()
         result = self.lock_step(node)

@@ -122,6 +122,7 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   outputs_known_ = any_answer_ = false;
   raw_counts_ = counts_ = {};
   trip_flags_ = 0;
+  answers_since_status_ = answers_since_outputs_ = 0;
   supply_V_ = temperature_C_ = rig::unknown;
   drops_seen_ = link_.socket->dropped();
   IoResult result = activate_node();

@@ -143,6 +143,8 @@ class CanDriver final : public BoardDriver {
   double supply_V_{rig::unknown};
   double temperature_C_{rig::unknown};
   std::uint32_t trip_flags_{0};
+  int answers_since_status_{0};
+  int answers_since_outputs_{0};
 
   // Commands sent, by sequence.
   std::uint8_t command_sequence_{0};

@@ -16,6 +16,8 @@ namespace {
 
 /// Most frames that one cycle reads. An answer has 4.
 constexpr int most_frames_in_a_cycle = 64;
+/// STATUS and OUTPUTS come with every tenth answer. Some may be lost, and the run goes on for as long.
+constexpr int most_answers_without = 50;
 /// Largest difference between the node's clock and ours over one interval. The node may answer at any time within the
 /// timeout.
 constexpr std::int64_t clock_slack_ns = 10'000'000;
@@ -90,9 +92,11 @@ void CanDriver::take_values(const Decoded& message) noexcept {
   if (message.id == id::status) {
     supply_V_ = values.supply_V();
     temperature_C_ = values.temperature_C();
+    answers_since_status_ = 0;
     return;
   }
   outputs_known_ = true;
+  answers_since_outputs_ = 0;
   applied_ = {.brake = values.brake_duty, .drive = values.drive_duty};
   applied_sequence_ = static_cast<std::uint8_t>(values.command_sequence);
   if (message.id != id::outputs) return;
@@ -218,6 +222,13 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
   outputs_known_ = false;
   if (!outputs_follow) {
     return {IoError::read_back_mismatch, id::outputs, 0, rig::Reason::can_outputs_not_taken};
+  }
+  // What is not reported cannot be checked: neither supply, temperature and trips, nor the duties that act.
+  if (++answers_since_status_ > most_answers_without) {
+    return {IoError::no_answer, id::status, 0, rig::Reason::board_health_lost};
+  }
+  if (++answers_since_outputs_ > most_answers_without) {
+    return {IoError::no_answer, id::outputs, 0, rig::Reason::can_outputs_not_taken};
   }
   node_time_us_ = answer.values.node_time_us;
   latched_ns_ = time_ns;

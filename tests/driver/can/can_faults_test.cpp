@@ -82,6 +82,27 @@ TEST_CASE("Each fault of the node ends with its reason once the bucket trips, an
   }
 }
 
+TEST_CASE("A node that no longer reports its health or its outputs ends the run after 50 answers") {
+  struct Case {
+    const char* fault;
+    Reason classic;
+    Reason fd;  ///< the outputs stand in every answer
+  };
+  for (const Case& c : {Case{"no-status", Reason::board_health_lost, Reason::board_health_lost},
+                        Case{"no-outputs", Reason::can_outputs_not_taken, Reason::none}}) {
+    for (const bool fd : {false, true}) {
+      INFO(c.fault << (fd ? " with CAN FD" : ""));
+      Active rig(fd);
+      rig.node.fault(c.fault);
+      const driver::IoResult result = rig.until_failure(100);
+      CHECK(result.reason == (fd ? c.fd : c.classic));
+      CHECK(result.ok() == (c.fd == Reason::none && fd));
+      CHECK((result.ok() || (rig.cycles > 40 && rig.cycles <= 60)));
+      CHECK(rig.node.wire().brake_duty == (result.ok() ? 0.5 : 0.0));
+    }
+  }
+}
+
 TEST_CASE("Answers in the wrong order are reported") {
   Active rig;
   rig.node.fault("swapped");
