@@ -38,7 +38,7 @@ struct GuardParts {
   std::int64_t timeout_ns{0};            ///< longest silence of a run; a run may ask for less
   std::int64_t keep_ns{0};               ///< from one look at the board to the next while no run is covered
   std::int64_t insist_ns{0};             ///< of the guard of one run: how long it tries; 0: it never gives up
-  Mail* mail{nullptr};                   ///< of the resident guard
+  Mail* mail{nullptr};                   ///< of the resident guard; replaced with its talker
   ServicePage* page{nullptr};            ///< of the resident guard
   std::atomic<bool>* released{nullptr};  ///< a person has ended the tries, which counts only while they are made
 };
@@ -80,6 +80,8 @@ class BoardGuard {
   [[nodiscard]] const GuardianReport& report() const noexcept { return report_; }
   /// The holder's handle; -1: nobody has the lease, or the process is gone.
   [[nodiscard]] int holder() const noexcept { return gone_ ? -1 : handle_; }
+  /// Readable when there are orders; another one after the mail was replaced. -1: the guard takes none.
+  [[nodiscard]] int orders() const noexcept { return parts_.mail == nullptr ? -1 : parts_.mail->order_descriptor(); }
   [[nodiscard]] std::int64_t look_period_ns() const noexcept { return look_period_ns_; }
 
  private:

@@ -82,7 +82,7 @@ int guard() {
   const bool lacks = setup.launch.realtime == runtime::RealtimeMode::prefer && !realtime.realtime();
   tell_controller(ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
 
-  run_guard(guard, -1, [] {});
+  run_guard(guard, clock, [] {});
   const GuardianReport& report = guard.report();
   if (report.reason == rig::Reason::none) return exit_verified;
   // The outputs are dealt with: the rest need not be real-time safe.

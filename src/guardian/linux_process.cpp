@@ -50,12 +50,14 @@ bool has_ended(int pidfd, int timeout_ms) noexcept {
   return ready > 0;
 }
 
-void wait_for_guard(const BoardGuard& guard, int orders) noexcept {
-  runtime::MonotonicClock clock;
+void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock) noexcept {
   const std::int64_t left_ns = std::max<std::int64_t>(0, guard.next_ns() - clock.now_ns());
   const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
-  std::array<pollfd, 2> files{pollfd{orders, POLLIN, 0}, pollfd{guard.holder(), POLLIN, 0}};
-  static_cast<void>(::ppoll(files.data(), files.size(), &left, nullptr));
+  std::array<pollfd, 2> files{pollfd{guard.orders(), POLLIN, 0}, pollfd{guard.holder(), POLLIN, 0}};
+  const bool over = ::ppoll(files.data(), files.size(), &left, nullptr) == 0;
+  // A broken descriptor ends every wait at once: the guard must not keep the processor from all others.
+  const auto readable = [](const pollfd& file) { return (file.revents & POLLIN) != 0; };
+  if (!over && std::ranges::none_of(files, readable)) clock.sleep_until(guard.next_ns());
 }
 
 bool send_signal(int pidfd, int signal) noexcept {

@@ -34,15 +34,15 @@ class LinuxProcesses final : public Processes {
   void end(int handle) noexcept override { static_cast<void>(send_signal(handle, SIGKILL)); }
 };
 
-/// Sleeps until the guard wants to look, or there is an order, or the holder has ended. `orders` may be -1.
-void wait_for_guard(const BoardGuard& guard, int orders) noexcept;
+/// Sleeps until the guard wants to look, or there is an order, or the holder has ended.
+void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock) noexcept;
 /// Runs the guard until it is over. `between` is called after each look.
 template <class Between>
-void run_guard(BoardGuard& guard, int orders, Between between) {
+void run_guard(BoardGuard& guard, runtime::Clock& clock, Between between) {
   while (!guard.over()) {
     guard.look();
     between();
-    if (!guard.over()) wait_for_guard(guard, orders);
+    if (!guard.over()) wait_for_guard(guard, clock);
   }
 }
 

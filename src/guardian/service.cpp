@@ -200,7 +200,7 @@ class Service {
     start_standby();
     start_talker();
     ServiceManager::ready();
-    run_guard(guard, mail_.order_descriptor(), [&] { between_looks(guard); });
+    run_guard(guard, clock_, [&] { between_looks(guard); });
     page_->over.store(true, std::memory_order_relaxed);
     ::unlink(options.socket.c_str());
     end_companions();
@@ -298,12 +298,6 @@ class Service {
 
   [[noreturn]] void stand_by(pid_t guard) {
     const auto board = driver::make_safe_state_writer(settings_.driver, true);
-    try {
-      if (board->works_beside_owner()) board->prepare();
-    } catch (const std::exception&) {
-      // The board is not there: it is opened when it is needed.
-    }
-    const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
     LinuxProcesses processes;
     const driver::FileDescriptor guard_process(open_pidfd(guard));
     if (::getppid() != guard || guard_process.get() < 0) ::_exit(exit_not_started);
@@ -313,6 +307,8 @@ class Service {
                      .page = *page_,
                      .guard = guard_process.get(),
                      .silence_ns = static_cast<std::int64_t>(settings_.guardian.standby_ms * rig::ns_per_ms)});
+    standby.look();  // before a lease can be granted, if possible: it opens the board
+    const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
     while (!standby.over()) {
       standby.look();
       clock_.sleep_until(standby.next_ns());

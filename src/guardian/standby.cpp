@@ -2,6 +2,7 @@
 #include "guardian/standby.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 namespace abs_hil::guardian {
@@ -49,7 +50,14 @@ void Standby::look() noexcept {
     run_may_live_until_ns_ =
         run_may_drive_until_ns_ + (parts_.board.works_beside_owner() ? run_lives_ns : owner_lives_ns);
   }
-  if (acting_) act();
+  if (acting_) return act();
+  if (run_pid_ == 0 && !std::exchange(prepared_, true)) prepare();
+}
+
+void Standby::prepare() noexcept try {
+  if (parts_.board.works_beside_owner()) parts_.board.prepare();
+} catch (const std::exception&) {
+  // The board is not there: it is opened when it is needed.
 }
 
 void Standby::act() noexcept {

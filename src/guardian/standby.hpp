@@ -17,8 +17,8 @@ namespace abs_hil::guardian {
 ///     3. ends the run if the outputs are not zero then, or if it still lives a second later;
 ///     4. writes zeros and reads them back until they are verified and the run is gone.
 ///
-/// Then its work is done: the service manager starts the service again. While the guard lives it does not touch the
-/// board.
+/// Then its work is done: the service manager starts the service again. While the guard lives it writes nothing to the
+/// board, and opens it only while nobody has the lease: a driver takes its questions for another program's.
 class Standby {
  public:
   struct Parts {
@@ -41,6 +41,7 @@ class Standby {
  private:
   [[nodiscard]] bool guard_lost() noexcept;
   void act() noexcept;
+  void prepare() noexcept;
 
   Parts parts_;
   std::int64_t now_ns_{0};
@@ -48,6 +49,7 @@ class Standby {
   std::int64_t last_look_ns_;
   std::int64_t silent_ns_{0};
   std::uint64_t beats_{0};
+  bool prepared_{false};  ///< it has tried to open the board
   bool acting_{false};
   bool zeroed_{false};
   bool acted_{false};

@@ -255,6 +255,23 @@ class Hm2Run(EmulatorTest):
                 service.end()
                 board.end()
 
+    def test_companions_of_the_resident_guardian_die(self):
+        """Its standby, its talker: the run goes on, new ones start, and the guard still sleeps between its looks."""
+        board = self.board()
+        service = self.resident(board)
+        program = self.start_resident(board, service)
+        guard = service.process.pid
+        for _ in ('standby', 'talker'):
+            old = self.children_of(guard)
+            os.kill(min(old), signal.SIGKILL)  # the oldest
+            wait_until(lambda old=old: len(set(self.children_of(guard)) - set(old)) == 1, 'no new companion')
+        error = program.communicate(timeout=120)[1]
+        self.assertEqual(program.returncode, 0, error)
+        wait_until(lambda: service.said().count('grants leases at') == 2, 'no new talker')
+        used_s = self.processor_s(guard)
+        time.sleep(1)
+        self.assertLess(self.processor_s(guard) - used_s, 0.5)
+
     def test_program_and_resident_guardian_dead_and_the_cable_out_and_in(self):
         board = self.board()
         service = self.resident(board)
@@ -308,6 +325,11 @@ class Hm2Run(EmulatorTest):
     def children_of(pid):
         return [int(child) for children in pathlib.Path(f'/proc/{pid}/task').glob('*/children')
                 for child in children.read_text().split()]
+
+    @staticmethod
+    def processor_s(pid):
+        times = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+        return (int(times[11]) + int(times[12])) / os.sysconf('SC_CLK_TCK')
 
     def guardians_of(self, pid):
         return [child for child in self.children_of(pid)

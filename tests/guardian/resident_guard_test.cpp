@@ -1,7 +1,9 @@
 // The guard of the resident service: leases, and the board while no run is covered.
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "guardian/linux_process.hpp"
 #include "resident_service.hpp"
 
 using namespace abs_hil;
@@ -307,4 +309,27 @@ TEST_CASE("a process for which there is no memory gets no lease, and its handle 
   CHECK(said.why == Refusal::no_memory);
   CHECK(service.processes.handles == 0);
   service.granted();
+}
+
+TEST_CASE("an order ends the guard's wait, also one in the mail that has replaced another") {
+  Service service;
+  service.pass(0);
+  for (int talker = 0; talker < 3; ++talker) {
+    REQUIRE(service.mail.order({.word = OrderWord::look}));
+    const std::int64_t before_ns = service.clock.now_ns();
+    wait_for_guard(service.guard, service.clock);
+    CHECK(service.clock.now_ns() == before_ns);
+    service.guard.look();
+    service.mail = Mail();
+  }
+}
+
+TEST_CASE("a broken descriptor does not end the guard's wait") {
+  Service service;
+  service.granted();
+  REQUIRE(::fcntl(service.guard.holder(), F_GETFD) < 0);
+  const std::int64_t next_ns = service.guard.next_ns();
+  REQUIRE(next_ns > service.clock.now_ns());
+  wait_for_guard(service.guard, service.clock);
+  CHECK(service.clock.now_ns() == next_ns);
 }

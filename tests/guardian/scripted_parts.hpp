@@ -95,7 +95,10 @@ class ScriptedBoard final : public driver::SafeStateWriter {
  public:
   explicit ScriptedBoard(Story& story) : story_(story) {}
   [[nodiscard]] std::string_view name() const noexcept override { return "scripted"; }
-  void prepare() override {}
+  void prepare() override {
+    ++prepared;
+    if (absent) throw driver::Unavailable("not there");
+  }
   [[nodiscard]] driver::IoResult make_safe() noexcept override {
     story_.emplace_back("write");
     held = true;
@@ -121,6 +124,8 @@ class ScriptedBoard final : public driver::SafeStateWriter {
   bool refuses_owners{true};
   bool shared{true};
   int fails_first{0};
+  int prepared{0};  ///< how often it was to be opened
+  bool absent{false};
 
  private:
   Story& story_;

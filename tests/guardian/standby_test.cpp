@@ -129,6 +129,33 @@ TEST_CASE("while the guard beats, the standby looks every 5 ms and touches neith
   CHECK(post.standby.next_ns() == post.clock.now_ns() + look_period_ns);
 }
 
+TEST_CASE("the standby opens the board once, while nobody has the lease, if two can have it open") {
+  Post post;
+  post.board.shared = GENERATE(true, false);
+  post.board.absent = GENERATE(true, false);
+  post.page.holder = run_process;
+  post.pass(1'000 * ms);
+  CHECK(post.board.prepared == 0);
+  post.page.holder = 0;
+  post.pass(1'000 * ms);
+  CHECK(post.board.prepared == (post.board.shared ? 1 : 0));
+  post.lose_guard();
+  post.pass(50 * ms);
+  CHECK(post.standby.acted());
+}
+
+TEST_CASE("a standby that began during a lease makes the board safe without having opened it before") {
+  Post post;
+  post.drives = true;
+  const std::int64_t found_ns = post.lose_guard_of_run();
+  post.processes.dies_at_ns[0] = found_ns;
+  post.pass(50 * ms);
+  CHECK(post.when("write") == found_ns);
+  CHECK(post.board.duty == 0.0);
+  CHECK(post.board.prepared == 0);
+  CHECK(post.standby.acted());
+}
+
 TEST_CASE("the standby notices a silent guard within the limit and one look, wherever the last beat falls") {
   for (std::int64_t offset_ns = 0; offset_ns < look_period_ns; offset_ns += 100 * us) {
     Post post;
