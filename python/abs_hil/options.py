@@ -86,7 +86,7 @@ def options(*, controller: Any = None, plant: PathLike | None = None, model: Pat
         if value is not None:
             given[name] = os.fspath(value)
     if isinstance(controller, str):
-        if controller.endswith(('.so', '.fmu')) or ':' in controller:
+        if controller.endswith(('.so', '.fmu', '.agent')) or ':' in controller:
             _take_controller_files()
         given['controller'] = controller
     if seed is not None:

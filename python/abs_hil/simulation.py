@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: what `abs_hil compare` varies by default
 STANDARD_VARIATION = 'parameters=0.1,theta=0.1,phase'
+#: what `abs_hil compare` takes
+REPEAT_MAX, SEED_MAX = 1_000_000, 2**64 - 1
 _ARGUMENTS = {'controller', 'plant', 'model', 'experiment', 'config', 'seed', 'set', 'inject'}
 
 
@@ -50,10 +52,16 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
                     experiment=None if experiment == 'paper' else experiment, model=model, config=config,
                     seed=None if seed == 1 else seed, set=set, inject=inject)
     law = _law_of(controller)
-    if repetition is not None and repetition < 0:
-        raise ValueError(f'repetition {repetition}: give the number of a varied plant, from 0')
-    varied = None if repetition is None else (vary, vary_seed, repetition)
+    varied = None
+    if repetition is not None:
+        varied = (vary, _within('vary_seed', vary_seed, 0, SEED_MAX), _within('repetition', repetition, 0, REPEAT_MAX - 1))
     return run_of(*_core.simulate(given, law, varied))
+
+
+def _within(name: str, number: int, least: int, most: int) -> int:
+    if not least <= number <= most:
+        raise ValueError(f'{name} {number}: give a whole number in [{least}, {most}]')
+    return number
 
 
 def _law_of(controller: Any) -> Any:
@@ -144,10 +152,9 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
     {"experiment.start_speed_rad_s": 170} does so here.
     """
     jobs = _grid(runs) if isinstance(runs, Mapping) else [dict(run) for run in runs]
-    if repeat < 1:
-        raise ValueError(f'repeat {repeat}: give a number of at least 1')
-    if not 0 <= threads <= 1024:
-        raise ValueError(f'threads {threads}: give a number in [0, 1024]')
+    _within('repeat', repeat, 1, REPEAT_MAX)
+    _within('vary_seed', vary_seed, 0, SEED_MAX)
+    _within('threads', threads, 0, 1024)
     given, laws = [], []
     for run in jobs:
         if unknown := run.keys() - _ARGUMENTS:

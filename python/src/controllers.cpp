@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
-#include <deque>
 #include <exception>
 #include <memory>
 #include <stdexcept>
@@ -14,6 +13,7 @@
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 #include "bindings.hpp"
+#include "python_law.hpp"
 
 namespace abs_hil::python {
 
@@ -36,12 +36,8 @@ class PythonController final : public control::SlipController {
  public:
   explicit PythonController(const py::object& controller) : controller_(controller) {
     const py::gil_scoped_acquire gil;
-    if (!py::hasattr(controller_, "signals")) return;
-    for (const auto& [name, meaning] : py::dict(controller_.attr("signals"))) {
-      texts_.push_back(py::cast<std::string>(name));
-      texts_.push_back(py::cast<std::string>(meaning));
-    }
-    for (std::size_t n = 0; n < texts_.size(); n += 2) signals_.push_back({texts_[n], texts_[n + 1]});
+    texts_ = law_signals(controller_);
+    for (const auto& [name, meaning] : texts_) signals_.push_back({name, meaning});
   }
   PythonController(const PythonController&) = delete;
   PythonController& operator=(const PythonController&) = delete;
@@ -56,18 +52,7 @@ class PythonController final : public control::SlipController {
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override {
     SlipOutput output{
         .brake_torque_Nm = rig::unknown, .slip_velocity_error_m_s = rig::unknown, .theta_est_N = rig::unknown};
-    call([&] {
-      const py::object returned = controller_.attr("step")(input);
-      if (py::isinstance<SlipOutput>(returned)) {
-        output = py::cast<SlipOutput>(returned);
-        return;
-      }
-      output.brake_torque_Nm = PyFloat_AsDouble(returned.ptr());
-      if (PyErr_Occurred() == nullptr) return;
-      PyErr_Clear();
-      throw py::type_error("the controller's step returned " + std::string(py::repr(returned)) +
-                           "; give the wanted brake torque in N m, a number, or an abs_hil.SlipOutput");
-    });
+    call([&] { output = law_output(controller_.attr("step")(input)); });
     return output;
   }
   [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override { return signals_; }
@@ -90,7 +75,7 @@ class PythonController final : public control::SlipController {
   }
 
   py::object controller_;
-  std::deque<std::string> texts_;  ///< never move
+  std::vector<std::pair<std::string, std::string>> texts_{};  ///< of signals_
   std::vector<rig::Signal> signals_;
 };
 

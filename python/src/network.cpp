@@ -19,9 +19,11 @@
 
 #include "commands/authority.hpp"
 #include "commands/sender.hpp"
+#include "interchange/agent_controller.hpp"
 #include "interchange/foreign_controller.hpp"
 #include "interchange/host.hpp"
 #include "interchange/hosted_code.hpp"
+#include "python_law.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/lcm_url.hpp"
 #include "telemetry/receiver.hpp"
@@ -110,6 +112,7 @@ py::dict controller_files(const std::string& program) {
   for (const control::ControllerFiles& files : interchange::foreign_controllers()) {
     makers[py::str(files.ending.data(), files.ending.size())] = py::capsule(reinterpret_cast<void*>(files.make));
   }
+  makers[".agent"] = py::capsule(reinterpret_cast<void*>(interchange::agent_controllers().make));
   return makers;
 }
 
@@ -117,18 +120,17 @@ py::dict controller_files(const std::string& program) {
 /// run says in which step.
 class PythonCode final : public interchange::ForeignCode {
  public:
-  /// @param parts  reset and step, which returns an abs_hil.SlipOutput, names of the signals, path of the module
-  explicit PythonCode(const py::tuple& parts) : reset_(parts[0]), step_(parts[1]) {
-    signals_ = parts[2].cast<std::vector<std::string>>();
-    source_ = parts[3].cast<std::string>();
+  /// @param parts  the law and the path of its module
+  explicit PythonCode(const py::tuple& parts) : reset_(parts[0].attr("reset")), step_(parts[0].attr("step")) {
+    for (auto& [name, meaning] : python::law_signals(parts[0])) signals_.push_back(std::move(name));
+    source_ = parts[1].cast<std::string>();
   }
   void reset(const abs_hil_input& input) noexcept override {
     ended_by_errors([&] { reset_(interchange::slip_input(input)); });
   }
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override {
-    ended_by_errors([&] {
-      output = interchange::foreign_output(step_(interchange::slip_input(input)).cast<control::SlipOutput>());
-    });
+    ended_by_errors(
+        [&] { output = interchange::foreign_output(python::law_output(step_(interchange::slip_input(input)))); });
   }
 
  private:
@@ -159,6 +161,8 @@ int serve_controller(const py::function& make) {
         } catch (py::error_already_set& error) {  // its own text would have a traceback through this program
           if (!error.matches(PyExc_ValueError)) throw;
           throw std::invalid_argument(py::str(error.value()));
+        } catch (const std::invalid_argument& error) {
+          throw std::invalid_argument("controller " + setup.file.string() + ": " + error.what());
         }
       },
       [] { return std::uint64_t{0}; });  // every step of Python allocates

@@ -42,6 +42,11 @@ class Broken(WrappedPi):
         return math.nan
 
 
+class Raising(WrappedPi):
+    def step(self, given):
+        raise ValueError('no bad input, but the law\'s own')
+
+
 def few():
     """Two cases whose model is paper-table1's."""
     return [case for case in cases.whole_set() if case.plant == 'paper-table1' and case.road == 'even'
@@ -182,6 +187,20 @@ def test_a_run_that_fails_has_no_distance():
     assert math.isnan(broken.total.excess_mean)
 
 
+def test_a_law_that_raises_fails_and_the_others_have_their_scores(tmp_path, capsys, monkeypatch):
+    sys.modules.setdefault('test_benchmark', sys.modules[__name__])
+    monkeypatch.setattr(cases, 'quick_cases', few)
+    target = tmp_path / 'score.json'
+    names = ['--controller', 'pi,test_benchmark:Raising']
+    assert main(['--quick', *names, '--json', str(target)]) == 0
+    assert 'test_benchmark:Raising: ValueError: no bad input' in capsys.readouterr().err
+    found = json.loads(target.read_text(encoding='utf-8'))['controllers']
+    assert [one['scores'][-1]['failed'] for one in found] == [0, 2]
+    assert found[1]['runs'][0]['fault'] == 'controller_not_finite'
+    assert main(['--verify', str(target)]) == 0
+    assert main(['--quick', *names, '--set', 'control.no_such_key=1']) == 2
+
+
 def test_utilisation_of_adhesion_nears_one_without_a_lag():
     # adaptive-peak from 170 rad/s: its distance is about 1 % above the causal optimum, which needs 1.809 s against 1.76 s
     # of a tyre at its peak throughout.
@@ -311,7 +330,8 @@ def test_a_controller_from_an_fmu(tmp_path):
     law, names = tmp_path / 'pi.fmu', tmp_path / 'map.toml'
     subprocess.run([program(), 'export-fmu', '--controller', 'pi', '--set', 'plant.ideal_sensors=true', '--out', str(law)],
                    check=True, capture_output=True)
-    names.write_text('[outputs]\nbrake_torque_ref_Nm = "brake_torque_Nm"\n', encoding='utf-8')
+    names.write_text('[outputs]\nbrake_torque_ref_Nm = "brake_torque_Nm"\n[inputs]\nupper_counts = "start"\n'
+                     'lower_counts = "start"\n', encoding='utf-8')
     entry = Entry(str(law), {'control.foreign.mapping': str(names)})
     of_fmu, of_program = (run(one, few(), bounds.stored(), seeds=(1,)) for one in (entry, Entry('pi', {})))
     for from_file, built_in in zip(of_fmu.rows, of_program.rows):

@@ -1,5 +1,7 @@
 """MODULE:CLASS, a controller in Python, wherever a controller is named: runs, comparisons, studies, and their refusals."""
 import csv
+import signal
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import abs_hil
 pytest.importorskip('abs_hil._network', reason='a wheel has no programs, and so no process for such a class')
 
 LAWS = '''
+import time
 import abs_hil
 
 class Proportional:
@@ -29,6 +32,22 @@ class Broken(Proportional):
 class Wordy(Proportional):
     def step(self, input):
         return "much"
+
+class Numeral(Proportional):
+    def step(self, input):
+        return "4.0"
+
+class Silent(Proportional):
+    def step(self, input):
+        pass
+
+class Signs(Proportional):
+    signals = 7
+
+class Slow(Proportional):
+    def step(self, input):
+        time.sleep(0.02)
+        return 4.0
 
 class Chatty(Proportional):
     def reset(self, input):
@@ -92,7 +111,7 @@ def test_a_comparison_and_a_study_take_it(folder, abs_hil_program):
                                         ('nowhere:Law', "No module named 'nowhere'; give MODULE:CLASS"),
                                         ('laws:Alone', 'it has no methods reset and step'),
                                         ('laws:Demanding', 'the class is made without arguments'),
-                                        ('laws:Failing', 'laws.py, line 29)\n'),
+                                        ('laws:Failing', 'laws.py, line 46)\n'),
                                         ('wrong:Law', 'SyntaxError: invalid syntax (wrong.py, line 2)\n'),
                                         ('my-laws:Law', 'MODULE:CLASS')])
 def test_a_class_that_cannot_be_used_is_refused_by_name(folder, name, said, abs_hil_program):
@@ -101,11 +120,45 @@ def test_a_class_that_cannot_be_used_is_refused_by_name(folder, name, said, abs_
     assert 'programs.py' not in result.stderr and 'At:' not in result.stderr  # no traceback through the program's own code
 
 
-@pytest.mark.parametrize('name, said', [('laws:Broken', 'ZeroDivisionError'), ('laws:Wordy', 'could not convert string to float')])
+@pytest.mark.parametrize('name, said', [('Broken', 'ZeroDivisionError'), ('Wordy', "step returned 'much'; give"),
+                                        ('Numeral', "step returned '4.0'; give"), ('Silent', 'step returned None; give')])
 def test_what_its_step_raises_ends_the_run_with_a_fault(folder, name, said, abs_hil_program):
-    result = abs_hil_program('--fast', '--no-lcm', '--controller', name, *QUICK_SET, status=1)
+    import laws
+    result = abs_hil_program('--fast', '--no-lcm', '--controller', f'laws:{name}', *QUICK_SET, status=1)
     assert said in result.stderr
-    assert f'(controller {name}): its code ended its process with status 1 in step' in result.stdout + result.stderr
+    assert f'(controller laws:{name}): its code ended its process with status 1 in step' in result.stdout + result.stderr
+    if name != 'Broken':
+        assert 'Traceback' not in result.stderr
+        with pytest.raises(TypeError, match=said):
+            abs_hil.simulate(getattr(laws, name)(), set=QUICK)
+
+
+def test_signals_that_are_none_are_refused_alike(folder):
+    import laws
+    for controller, whose in (('laws:Signs', 'controller laws:Signs: '), (laws.Signs(), '')):
+        with pytest.raises(ValueError, match=f"{whose}the controller's signals are 7; give a dictionary"):
+            abs_hil.simulate(controller, set=QUICK)
+
+
+def test_a_signal_ends_a_run_of_slow_steps_at_once(folder):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+    before = signal.signal(signal.SIGALRM, interrupt)
+    begun_s = time.monotonic()
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            abs_hil.simulate('laws:Slow', set=QUICK)
+        lasted_s = time.monotonic() - begun_s
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert lasted_s < 5.0  # 1000 steps take 20 s
+
+
+def test_a_file_of_an_agent_that_is_missing():
+    with pytest.raises(ValueError, match='nope.agent: No such file.*abs_hil.learning.rig_environment makes this file'):
+        abs_hil.simulate('nope.agent')
 
 
 def test_what_it_prints_comes_out_on_stderr(folder, abs_hil_program):

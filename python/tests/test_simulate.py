@@ -215,6 +215,15 @@ def test_a_series_is_that_of_the_program(tmp_path, abs_hil_program, head, phases
         abs_hil.simulate_series('no-such')
 
 
+def test_numbers_out_of_range_are_refused():
+    for name, number, most in (('repeat', 10**12, 10**6), ('vary_seed', 10**30, 2**64 - 1), ('threads', 1025, 1024)):
+        with pytest.raises(ValueError, match=rf'{name} {number}: give a whole number in \[[01], {most}\]'):
+            abs_hil.simulate_many([{}], **{name: number})
+    for name, number in (('repetition', 10**30), ('repetition', -1), ('vary_seed', 10**30)):
+        with pytest.raises(ValueError, match=f'{name} {number}: give a whole number'):
+            abs_hil.simulate(**{'repetition': 0, name: number})
+
+
 def test_an_argument_that_no_run_has_is_refused_by_name():
     for runs in ([{'thresold': 1}], {'thresold': [1, 2]}):
         with pytest.raises(ValueError, match="'thresold' is no argument of a run; give some of config, controller, .*"):

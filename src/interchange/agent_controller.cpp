@@ -20,26 +20,26 @@ namespace {
 
 constexpr double longest_hold_s = 1.0;
 
-[[noreturn]] void refuse(const std::string& file, const std::string& why) {
+[[noreturn]] void refuse_agent(const std::string& file, const std::string& why) {
   throw std::invalid_argument("controller " + file + ": " + why +
                               "; abs_hil.learning.rig_environment makes this file and starts the program with it");
 }
 
 AgentPage* mapped(const std::string& file) {
   const driver::FileDescriptor opened(::open(file.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-  if (opened.get() < 0) refuse(file, std::strerror(errno));
+  if (opened.get() < 0) refuse_agent(file, std::strerror(errno));
   struct stat facts {};
   if (::fstat(opened.get(), &facts) != 0 || !S_ISREG(facts.st_mode) ||
       facts.st_size != static_cast<off_t>(AgentPage::size)) {
-    refuse(file, "no file of 4096 bytes");
+    refuse_agent(file, "no file of 4096 bytes");
   }
   void* const memory =
       ::mmap(nullptr, AgentPage::size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, opened.get(), 0);
-  if (memory == MAP_FAILED) refuse(file, std::strerror(errno));
+  if (memory == MAP_FAILED) refuse_agent(file, std::strerror(errno));
   auto* const page = static_cast<AgentPage*>(memory);
   if (page->mark == AgentPage::right_mark && page->hold_s > 0.0 && page->hold_s <= longest_hold_s) return page;
   ::munmap(memory, AgentPage::size);
-  refuse(file, "its mark is not abs_agt01, or it holds an action for a time outside (0, 1] s");
+  refuse_agent(file, "its mark is not abs_agt01, or it holds an action for a time outside (0, 1] s");
 }
 
 }  // namespace

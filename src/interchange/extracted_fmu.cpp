@@ -195,6 +195,8 @@ void check_count(const fs::path& file) {
 }  // namespace
 
 ExtractedFmu::ExtractedFmu(const fs::path& file) {
+  // What is no file is not read: a folder cannot be, and a pipe would keep the program waiting.
+  if (fs::exists(file) && !fs::is_regular_file(file)) refuse(file, "not an FMU: it is no regular file");
   check_count(file);
   int code = 0;
   const std::unique_ptr<zip_t, Closer> archive(zip_open(file.c_str(), ZIP_RDONLY, &code));

@@ -44,7 +44,21 @@ void log3(fmi3InstanceEnvironment /*environment*/, fmi3Status status, fmi3String
   if (status >= fmi3Error) say("controller", message);
 }
 
-/// The functions of one version that a controller needs. They return true if they worked.
+/// A call of a function of the FMU, and the status that it returned.
+struct Called {
+  const char* function{""};
+  unsigned status{0};
+  [[nodiscard]] bool worked() const { return status <= fmi2Warning; }
+  [[nodiscard]] std::string text() const {
+    constexpr std::array names{"OK", "Warning", "Discard", "Error", "Fatal", "Pending"};
+    if (status == wants_the_end) return fmt::format("its {} asked to end the simulation", function);
+    if (status >= names.size()) return fmt::format("its {} returned the unknown status {}", function, status);
+    return fmt::format("its {} returned {:.4}{}", function, function, names[status]);
+  }
+  static constexpr unsigned wants_the_end = 1000;
+};
+
+/// The functions of one version that a controller needs.
 class Instance2 {
  public:
   Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) {
@@ -69,22 +83,27 @@ class Instance2 {
     if (instance_ != nullptr) free_(instance_);
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] bool set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value) <= fmi2Warning; }
-  [[nodiscard]] bool get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value) <= fmi2Warning; }
-  [[nodiscard]] bool set_flag(std::uint32_t r, bool flag) const {
+  [[nodiscard]] Called set(std::uint32_t r, double value) const {
+    return {"fmi2SetReal", set_(instance_, &r, 1, &value)};
+  }
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const {
+    return {"fmi2GetReal", get_(instance_, &r, 1, &value)};
+  }
+  [[nodiscard]] Called set_flag(std::uint32_t r, bool flag) const {
     const fmi2Boolean value = flag ? fmi2True : fmi2False;
-    return set_flag_(instance_, &r, 1, &value) <= fmi2Warning;
+    return {"fmi2SetBoolean", set_flag_(instance_, &r, 1, &value)};
   }
-  [[nodiscard]] bool set_integer(std::uint32_t r, int value) const {
-    return set_integer_(instance_, &r, 1, &value) <= fmi2Warning;
+  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
+    return {"fmi2SetInteger", set_integer_(instance_, &r, 1, &value)};
   }
-  [[nodiscard]] bool enter() const {
-    return set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0) <= fmi2Warning && enter_(instance_) <= fmi2Warning;
+  [[nodiscard]] Called enter() const {
+    const Called called{"fmi2SetupExperiment", set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0)};
+    return called.worked() ? Called{"fmi2EnterInitializationMode", enter_(instance_)} : called;
   }
-  [[nodiscard]] bool exit() const { return exit_(instance_) <= fmi2Warning; }
-  [[nodiscard]] bool reset() const { return reset_(instance_) <= fmi2Warning; }
-  [[nodiscard]] bool step(double time_s, double step_s) const {
-    return step_(instance_, time_s, step_s, fmi2True) <= fmi2Warning;
+  [[nodiscard]] Called exit() const { return {"fmi2ExitInitializationMode", exit_(instance_)}; }
+  [[nodiscard]] Called reset() const { return {"fmi2Reset", reset_(instance_)}; }
+  [[nodiscard]] Called step(double time_s, double step_s) const {
+    return {"fmi2DoStep", step_(instance_, time_s, step_s, fmi2True)};
   }
 
  private:
@@ -126,27 +145,30 @@ class Instance3 {
     if (instance_ != nullptr) free_(instance_);
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] bool set(std::uint32_t r, double value) const {
-    return set_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  [[nodiscard]] Called set(std::uint32_t r, double value) const {
+    return {"fmi3SetFloat64", set_(instance_, &r, 1, &value, 1)};
   }
-  [[nodiscard]] bool get(std::uint32_t r, double& value) const {
-    return get_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const {
+    return {"fmi3GetFloat64", get_(instance_, &r, 1, &value, 1)};
   }
-  [[nodiscard]] bool set_flag(std::uint32_t r, bool value) const {
-    return set_flag_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const {
+    return {"fmi3SetBoolean", set_flag_(instance_, &r, 1, &value, 1)};
   }
-  [[nodiscard]] bool set_integer(std::uint32_t r, int value) const {
-    return set_integer_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
+    return {"fmi3SetInt32", set_integer_(instance_, &r, 1, &value, 1)};
   }
-  [[nodiscard]] bool enter() const { return enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0) <= fmi3Warning; }
-  [[nodiscard]] bool exit() const { return exit_(instance_) <= fmi3Warning; }
-  [[nodiscard]] bool reset() const { return reset_(instance_) <= fmi3Warning; }
-  [[nodiscard]] bool step(double time_s, double step_s) const {
+  [[nodiscard]] Called enter() const {
+    return {"fmi3EnterInitializationMode", enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0)};
+  }
+  [[nodiscard]] Called exit() const { return {"fmi3ExitInitializationMode", exit_(instance_)}; }
+  [[nodiscard]] Called reset() const { return {"fmi3Reset", reset_(instance_)}; }
+  [[nodiscard]] Called step(double time_s, double step_s) const {
     fmi3Boolean event = fmi3False;
     fmi3Boolean terminate = fmi3False;
     fmi3Boolean early = fmi3False;
     fmi3Float64 last_s = 0.0;
-    return step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s) <= fmi3Warning && !terminate;
+    const Called called{"fmi3DoStep", step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s)};
+    return called.worked() && terminate ? Called{"fmi3DoStep", Called::wants_the_end} : called;
   }
 
  private:
@@ -174,7 +196,8 @@ class FmuCode final : public ForeignCode {
         instance_(library_, facts_, (setup.folder / "resources").string()),
         period_s_(setup.period_s) {
     if (!instance_.made()) refuse(setup.file, "it cannot be instantiated; the line above says why, if the FMU did");
-    if (!begin()) refuse(setup.file, "its initialisation failed; the line above says why, if the FMU did");
+    begin();
+    if (!failed_.worked()) refuse(setup.file, failed_.text() + "; the line above says why, if the FMU did");
   }
 
   void reset(const abs_hil_input& /*input*/) noexcept override {
@@ -182,43 +205,53 @@ class FmuCode final : public ForeignCode {
   }
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override {
     fresh_ = false;
-    bool sound = sound_;
-    for (const FmuLink& in : facts_.inputs) sound = sound && instance_.set(in.reference, field_of(&input, in.offset));
-    sound = sound && instance_.step(static_cast<double>(steps_) * period_s_, period_s_);
-    ++steps_;
+    if (failed_.worked()) ++steps_;
+    for (const FmuLink& in : facts_.inputs)
+      call([&] { return instance_.set(in.reference, field_of(&input, in.offset)); });
+    call([&] { return instance_.step(static_cast<double>(steps_ - 1) * period_s_, period_s_); });
     for (const FmuLink& out : facts_.outputs) {
       double value = std::numeric_limits<double>::quiet_NaN();
-      sound = sound && instance_.get(out.reference, value);
+      call([&] { return instance_.get(out.reference, value); });
       put_field(&output, out.offset, value);
     }
-    sound_ = sound;
-    if (!sound) output.brake_torque_Nm = std::numeric_limits<double>::quiet_NaN();
+    if (!failed_.worked()) output.brake_torque_Nm = std::numeric_limits<double>::quiet_NaN();
   }
   void be_fresh() noexcept override { restart(); }
   [[nodiscard]] std::string failure() const override {
-    return sound_ ? std::string() : fmt::format("the FMU reported an error in step {}", steps_);
+    if (failed_.worked()) return {};
+    return steps_ == 0 ? failed_.text() + " before its first step"
+                       : fmt::format("{} in step {}", failed_.text(), steps_);
   }
 
  private:
-  bool begin() {
-    bool sound = true;
-    for (const FmuLink& p : facts_.parameters) sound = sound && instance_.set(p.reference, p.value);
-    for (const FmuLink& p : facts_.flags) sound = sound && instance_.set_flag(p.reference, p.value != 0.0);
-    for (const FmuLink& p : facts_.integers)
-      sound = sound && instance_.set_integer(p.reference, static_cast<int>(p.value));
-    steps_ = 0;
-    fresh_ = sound_ = sound && instance_.enter() && instance_.exit();
-    return sound_;
+  /// Nothing more is called after a failure.
+  template <class Call>
+  void call(const Call& function) {
+    if (failed_.worked()) failed_ = function();
   }
-  void restart() noexcept { sound_ = instance_.reset() && begin(); }
+  void begin() {
+    for (const FmuLink& p : facts_.parameters) call([&] { return instance_.set(p.reference, p.value); });
+    for (const FmuLink& p : facts_.flags) call([&] { return instance_.set_flag(p.reference, p.value != 0.0); });
+    for (const FmuLink& p : facts_.integers)
+      call([&] { return instance_.set_integer(p.reference, static_cast<int>(p.value)); });
+    call([&] { return instance_.enter(); });
+    call([&] { return instance_.exit(); });
+    fresh_ = failed_.worked();
+  }
+  void restart() noexcept {
+    failed_ = {};
+    steps_ = 0;
+    call([&] { return instance_.reset(); });
+    begin();
+  }
 
   FmuFacts facts_;
   LoadedLibrary library_;
   Instance instance_;
   double period_s_;
-  std::int64_t steps_{0};
+  std::int64_t steps_{0};  ///< since the last reset
   bool fresh_{false};
-  bool sound_{true};
+  Called failed_{};  ///< the last call, and the first that failed
 };
 
 }  // namespace

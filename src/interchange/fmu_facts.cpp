@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <map>
 #include <pugixml.hpp>
@@ -56,10 +58,21 @@ using TheirVariables = std::map<std::string, TheirVariable, std::less<>>;
 
 bool is_real(const TheirVariable& variable) { return variable.type == "Real" || variable.type == "Float64"; }
 
-TheirVariables variables_of(pugi::xml_node root, int fmi) {
+std::uint32_t reference_of(const fs::path& file, pugi::xml_node node) {
+  const std::string_view text = node.attribute("valueReference").as_string();
+  std::uint32_t reference = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), reference);
+  if (error == std::errc() && end == text.data() + text.size()) return reference;
+  refuse(file, fmt::format("damaged modelDescription.xml: variable \"{}\" has the valueReference \"{}\"; it needs a "
+                           "whole number in [0, 4294967295]",
+                           node.attribute("name").as_string(), text));
+}
+
+TheirVariables variables_of(const fs::path& file, pugi::xml_node root, int fmi) {
   TheirVariables found;
   for (const pugi::xml_node node : root.child("ModelVariables").children()) {
-    TheirVariable variable{.reference = node.attribute("valueReference").as_uint(),
+    if (node.type() != pugi::node_element) continue;
+    TheirVariable variable{.reference = reference_of(file, node),
                            .type = node.name(),
                            .causality = node.attribute("causality").as_string("local")};
     if (fmi == 2) {
@@ -67,7 +80,10 @@ TheirVariables variables_of(pugi::xml_node root, int fmi) {
         if (node.child(type)) variable.type = type;
       }
     }
-    found.emplace(node.attribute("name").as_string(), std::move(variable));
+    const std::string name = node.attribute("name").as_string();
+    if (!found.emplace(name, std::move(variable)).second) {
+      refuse(file, fmt::format("damaged modelDescription.xml: it has two variables \"{}\"", name));
+    }
   }
   return found;
 }
@@ -95,26 +111,39 @@ void link(const fs::path& file, const TheirVariables& variables, const toml::tab
     }
     links.push_back({.reference = variable.reference, .offset = quantity.offset});
   };
-  std::set<std::string> named;
+  const auto find = [&](std::string_view name) { return std::ranges::find(ours, name, &CarriedQuantity::name); };
+  const bool inputs = std::string_view(causality) == "input";
+  const auto known = [&] {
+    std::string all;
+    for (const CarriedQuantity& q : ours) all.append(all.empty() ? "" : ", ").append(q.name);
+    return all + (inputs ? ", start (it keeps its start value)" : "");
+  };
+  std::set<std::string_view> named;
   if (names != nullptr) {
     for (const auto& [key, node] : *names) {
       const std::string name(key.str());
-      const auto text = node.template value<std::string>();
-      const auto quantity =
-          std::find_if(ours.begin(), ours.end(), [&](const CarriedQuantity& q) { return text && *text == q.name; });
+      const auto text = node.template value<std::string_view>().value_or("");
+      if (inputs && text == "start") {
+        static_cast<void>(their(file, variables, name, causality));
+        continue;
+      }
+      const auto quantity = find(text);
       if (quantity == ours.end()) {
-        std::string known;
-        for (const CarriedQuantity& q : ours) known.append(known.empty() ? "" : ", ").append(q.name);
-        refuse(file, fmt::format("control.foreign.mapping: {}s.\"{}\": give one of {}", causality, name, known));
+        refuse(file, fmt::format("control.foreign.mapping: {}s.\"{}\": give one of {}", causality, name, known()));
       }
       add(name, *quantity);
       named.insert(quantity->name);
     }
   }
-  for (const CarriedQuantity& quantity : ours) {
-    if (named.contains(quantity.name)) continue;
-    const auto at = variables.find(quantity.name);
-    if (at != variables.end() && at->second.causality == causality) add(quantity.name, quantity);
+  for (const auto& [name, variable] : variables) {
+    if (variable.causality != causality || (names != nullptr && names->contains(name))) continue;
+    const auto quantity = find(name);
+    if (inputs && quantity == ours.end()) {
+      refuse(file, fmt::format("its input \"{}\" has no name of ours; give it one of {} in the table [inputs] of "
+                               "control.foreign.mapping",
+                               name, known()));
+    }
+    if (quantity != ours.end() && (inputs || !named.contains(name))) add(name, *quantity);
   }
 }
 
@@ -186,7 +215,7 @@ FmuFacts facts_of(const fs::path& file, const fs::path& folder, const fs::path& 
     refuse(file, fmt::format("it has no {}, the library that its description names",
                              fs::relative(facts.library, folder).string()));
   }
-  const TheirVariables variables = variables_of(root, facts.fmi);
+  const TheirVariables variables = variables_of(file, root, facts.fmi);
   const toml::table names = read_mapping(mapping);
   link(file, variables, names["inputs"].as_table(), "input", our_inputs, facts.inputs);
   link(file, variables, names["outputs"].as_table(), "output", our_outputs, facts.outputs);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abs_hil/interchange/controller.h"
@@ -12,7 +13,7 @@ namespace abs_hil::interchange {
 
 /// A quantity of ours that a variable of an FMU may carry.
 struct CarriedQuantity {
-  const char* name;
+  std::string_view name;
   std::size_t offset;  ///< in abs_hil_input or abs_hil_output
 };
 

@@ -55,7 +55,7 @@ StepTimes warm_up(ForeignCode& code, double period_s, std::int64_t steps) {
     durations_ns.push_back(clock.now_ns() - before_ns);
     if (!code.failure().empty()) break;
   }
-  code.be_fresh();
+  if (code.failure().empty()) code.be_fresh();
   if (durations_ns.empty()) return {};
   std::ranges::sort(durations_ns);
   const std::size_t count = durations_ns.size();

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <exception>
 #include <nlohmann/json.hpp>
@@ -91,6 +92,10 @@ int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup
         answer.offences = probe(*code, request, allocations);
         static_cast<void>(send_packet(&answer, sizeof answer));
         ::_exit(0);  // no system call but this one is done any more
+    }
+    // A step that works costs no text.
+    if (request.action != HostAction::step || std::isnan(answer.output.brake_torque_Nm)) {
+      code->failure().copy(answer.failure.data(), answer.failure.size() - 1);
     }
     if (!send_packet(&answer, sizeof answer)) break;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "interchange/foreign_code.hpp"
@@ -39,6 +40,7 @@ struct HostAnswer {
   std::int64_t step_ns{0};
   StepTimes times{};
   Offences offences{};
+  std::array<char, 128> failure{};  ///< ForeignCode::failure
 };
 
 /// The last word of a host whose code asked for a forbidden system call; shorter than any answer.

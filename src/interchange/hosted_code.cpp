@@ -37,6 +37,8 @@ constexpr int start_limit_ms = 20'000;
 /// All steps of a run may take this long and this many times as long as the time that they simulate.
 constexpr std::int64_t run_grace_ns = 10'000'000'000;
 constexpr double run_slowness_max = 100.0;
+constexpr const char* not_allowed =
+    "a controller from a file may start no process, touch no other process and take no priority";
 /// What foreign code prints is passed on up to this many bytes.
 constexpr std::size_t printed_max = 65'536;
 
@@ -215,10 +217,8 @@ std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
     HostRefusal refusal;
     std::memcpy(&refusal, answer, sizeof refusal);
     end();
-    return fmt::format(
-        "was ended: it asked for the system call {} ({}); a controller from a file may start no process, touch "
-        "no other process and take no priority",
-        refusal.system_call, name_of_forbidden(refusal.system_call));
+    return fmt::format("was ended: it asked for the system call {} ({}); {}", refusal.system_call,
+                       name_of_forbidden(refusal.system_call), not_allowed);
   }
   if (got != 0) {
     const bool threads = too_many_threads();
@@ -238,6 +238,11 @@ std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
   }
   pid_ = 0;
   end();
+  // The C library starts a process with all signals blocked, so the host cannot tell which call it was.
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS) {
+    return fmt::format("was ended: it asked for a system call that is not allowed, probably to start a process; {}",
+                       not_allowed);
+  }
   if (WIFSIGNALED(status)) return fmt::format("crashed: {}", ::strsignal(WTERMSIG(status)));
   return fmt::format("ended its process with status {}", WEXITSTATUS(status));
 }
@@ -248,7 +253,11 @@ bool HostedCode::ask(const HostRequest& request, HostAnswer& answer) noexcept {
   const ssize_t got = sent ? receive(&answer, sizeof answer, step_limit_ms) : 0;
   constexpr std::uint64_t steps_between_looks = 256;
   const bool crowded = all_steps_ % steps_between_looks == 0 && too_many_threads();
-  if (got == static_cast<ssize_t>(sizeof answer) && !crowded) return true;
+  if (got == static_cast<ssize_t>(sizeof answer) && !crowded) {
+    answer.failure.back() = '\0';
+    failure_ = answer.failure.data();
+    return failure_.empty();
+  }
   failure_ = fmt::format("its code {} in step {}", how_it_ended(crowded ? -1 : got, &answer), steps_);
   return false;
 }

@@ -29,6 +29,9 @@ constexpr std::size_t ring_capacity = 8192;
 /// The ring of a stepped run is emptied after every cycle, and clearing a large one would cost more than the run.
 constexpr std::size_t stepped_ring_capacity = 2;
 constexpr int fast_cycles_per_drain = 1000;
+/// A controller whose steps take long must not keep Ctrl-C waiting.
+constexpr std::int64_t fast_drain_max_ns = 100'000'000;
+constexpr int fast_cycles_per_look = 8;
 
 /// Time for the cycle's thread to start.
 constexpr std::int64_t start_margin_ns = 100'000'000;
@@ -212,8 +215,13 @@ RunOutcome Run::run_fast(const Poll& poll, bool own_thread) {
   if (watch_slow_cycles_) slow_cycles_.emplace(executive_.period_ns());
   ran_ = true;
   bool running = true;
+  runtime::MonotonicClock wall;
   while (running) {
-    for (int i = 0; i < fast_cycles_per_drain && running; ++i) running = step();
+    const std::int64_t begun_ns = wall.now_ns();
+    for (int i = 0; i < fast_cycles_per_drain && running; ++i) {
+      running = step();
+      if (i % fast_cycles_per_look == 0 && wall.now_ns() - begun_ns > fast_drain_max_ns) break;
+    }
     pump_.drain();
     if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
   }

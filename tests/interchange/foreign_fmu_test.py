@@ -22,7 +22,8 @@ except ImportError as error:
 
 START = ['--set', 'experiment.start_speed_rad_s=170']
 IDEAL = ['--set', 'plant.ideal_sensors=true', '--set', 'plant.ideal_actuator=true']
-OUTPUT = '[outputs]\n"brake_torque_ref_Nm" = "brake_torque_Nm"\n'
+COUNTS = '[inputs]\nupper_counts = "start"\nlower_counts = "start"\n'
+OUTPUT = '[outputs]\n"brake_torque_ref_Nm" = "brake_torque_Nm"\n' + COUNTS
 
 
 class ForeignFmu(RigTest):
@@ -151,15 +152,35 @@ class ForeignFmu(RigTest):
         self.refused(self.description(b'fmiVersion="2.0"', b'fmiVersion="1.0"'), '"1.0"', options=mapping)
         self.refused(self.description(b'</fmiModelDescription>', b''), 'damaged modelDescription.xml', options=mapping)
         self.refused(self.edited(lambda e, d: [] if e.endswith('.xml') else [(e, d)]), 'no modelDescription.xml')
-        self.refused(self.export(), 'brake_torque_Nm', 'control.foreign.mapping')
-        for text, words in ((OUTPUT + '[inputs]\n"nothing" = "slip"\n', ('"nothing"',)),
-                            (OUTPUT + '[inputs]\n"slip_est" = "slip"\n', ('slip_est', 'causality output')),
-                            ('[outputs]\n"omega1_rad_s" = "brake_torque_Nm"\n', ('omega1_rad_s', 'causality input')),
-                            (OUTPUT + '[inputs]\n"upper_counts" = "slip"\n', ('upper_counts', 'Integer')),
-                            (OUTPUT + '[inputs]\n"omega1_rad_s" = "speed"\n', ('omega2_rad_s, slip',)),
+        self.refused(self.export(), 'input "lower_counts"', 'omega2_rad_s, slip', 'in the table [inputs]',
+                     options=self.mapping(OUTPUT.replace('lower_counts = "start"', '')))
+        for text, words in ((OUTPUT + '"nothing" = "slip"\n', ('"nothing"',)), (OUTPUT + '"other" = "start"\n', ('"other"',)),
+                            (OUTPUT + '"slip_est" = "slip"\n', ('slip_est', 'causality output')),
+                            (COUNTS + '[outputs]\n"omega1_rad_s" = "brake_torque_Nm"\n', ('omega1_rad_s', 'causality input')),
+                            (OUTPUT.replace('upper_counts = "start"', 'upper_counts = "slip"'), ('upper_counts', 'Integer')),
+                            (OUTPUT + '"omega1_rad_s" = "speed"\n', ('omega2_rad_s, slip',)),
+                            (COUNTS, ('no output brake_torque_Nm',)),
                             (OUTPUT + '[parameters]\n"control.slip_ref" = "high"\n', ('control.slip_ref', 'Real')),
                             ('[outputs\n', ('line 1',)), ('[names]\n', ('inputs, outputs, parameters',))):
             self.refused(self.export(), *words, options=self.mapping(text))
+
+    def test_a_damaged_description_is_refused(self):
+        for old, new, words in ((b'name="slip_est" valueReference="', b'name="slip_est" other="', 'the valueReference ""'),
+                                (b'name="slip_est" valueReference="', b'name="slip_est" valueReference="-', 'valueReference "-'),
+                                (b'name="slip_est" valueReference="', b'name="slip_est" valueReference="99999999', '"99999999'),
+                                (b'name="omega2_rad_s"', b'name="omega1_rad_s"', 'two variables "omega1_rad_s"')):
+            self.refused(self.description(old, new), 'damaged modelDescription.xml', words, options=self.mapping(OUTPUT))
+
+    def test_a_call_that_fails_is_named_with_its_status_and_step(self):
+        names = self.mapping(OUTPUT)
+        for fmi in (2, 3):  # no step of theirs may be shorter than their own period
+            law = self.export(fmi, rate_Hz=100)
+            result = self.run_program('--fast', '--no-lcm', '--no-out', '--controller', law, *names, *START, *IDEAL)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn(f'its fmi{fmi}DoStep returned fmi{fmi}Error in step 1', result.stderr)
+        result = self.run_program('--no-lcm', '--no-out', '--rt', 'off', '--controller', self.export(2, 100), *names)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('in a trial its fmi2DoStep returned fmi2Error in step 1', result.stderr)
 
     def test_hostile_archives_are_refused(self):
         mapping = self.mapping(OUTPUT)
@@ -194,6 +215,8 @@ class ForeignFmu(RigTest):
         path.write_bytes(whole[:place] + b'\0' * 64 + whole[place + 64:])
         self.refused(path, 'damaged', options=mapping)
         self.refused(self.folder / 'nowhere.fmu', 'nowhere.fmu')
+        (self.folder / 'folder.fmu').mkdir()
+        self.refused(self.folder / 'folder.fmu', 'folder.fmu', 'no regular file')
 
     def test_library_without_functions_does_not_run(self):
         library = broken(self.folder, 'SOUND').read_bytes()

@@ -45,6 +45,8 @@ static void do_it(void) {
   syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0);
 #elif defined(SHELL)
   execl("/bin/sh", "sh", "-c", "sleep 1000", (char*)0);
+#elif defined(SYSTEM)
+  system("true");
 #elif defined(THREADS)
   pthread_attr_t small;
   pthread_t thread;

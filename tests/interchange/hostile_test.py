@@ -19,6 +19,7 @@ OWN = sys.argv.pop(1)
 FORBIDDEN = 'asked for the system call'
 # deed: words of the reason
 DEEDS = {'FORK_BOMB': FORBIDDEN, 'DAEMON': FORBIDDEN, 'CLONE_RAW': '(clone)', 'SHELL': '(execve)', 'NETWORK': 'Aborted',
+         'SYSTEM': 'probably to start a process',
          'OTHER_SOCKETS': 'Aborted', 'KILLS_PARENT': '(kill)', 'STOPS_PARENT': '(kill)', 'KILLS_ALL': '(kill)',
          'SIGNALS_BY_OWNER': '(fcntl)', 'LEAVES_PARENT': '(prctl)', 'TRACES': '(ptrace)', 'LIMITS_PARENT': '(prlimit64)',
          'PRIORITY': '(sched_setscheduler)', 'NAMESPACE': '(unshare)', 'THREADS': 'threads', 'MEMORY': 'Segmentation fault',
@@ -156,7 +157,8 @@ class Files(ProgramTest):
                 path = self.folder / f'{name}.fmu'
                 with zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED) as archive:
                     archive.writestr('modelDescription.xml', f'{head}{inner}<ModelVariables><ScalarVariable name="brake_torque_Nm" '
-                                     'causality="output"><Real/></ScalarVariable><ScalarVariable name="slip" causality="input"><Real/>'
+                                     'valueReference="0" causality="output"><Real/></ScalarVariable><ScalarVariable name="slip" '
+                                     'valueReference="1" causality="input"><Real/>'
                                      '</ScalarVariable></ModelVariables></fmiModelDescription>')
                     archive.writestr('binaries/linux64/x.so', b'x')
                     for n in range(files):

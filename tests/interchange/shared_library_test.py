@@ -30,6 +30,7 @@ class SharedLibraryTest(ProgramTest):
         self.assertEqual(len(result.stderr.strip().splitlines()), 1, result.stderr)
         for word in (str(library), *words):
             self.assertIn(str(word), result.stderr)
+        self.assertNotIn('rig_environment', result.stderr)
         self.assertEqual(trace.exists(), code_ran)
 
     def test_the_example_stops_as_pi_does(self):

@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +13,7 @@ import numpy as np
 from ..figures import OVERSHOOT
 from ..interchange.host import made
 from ..options import Value
-from ..simulation import keys, simulate, simulate_many
+from ..simulation import Study, keys, simulate, simulate_many
 from .adhesion import least_time_s
 from .bounds import coasted, identity
 from .cases import COAST_S, END_SPEED_M_S, SEEDS, Case
@@ -75,18 +77,22 @@ FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSH
 
 def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[dict[str, np.ndarray], list[str]]:
     """Each figure, shape (runs,), and the reason of each run's early end."""
-    if not entry.in_python:
-        study = simulate_many(runs, threads=threads)
-        return {name: study[name] for name in FIGURES}, [str(fault) for fault in study['fault']]
-    summaries = [simulate(**{**run, 'controller': entry.made()}).summary for run in runs]
-    columns: dict[str, list[float]] = {name: [] for name in FIGURES}
-    faults = []
-    for summary in summaries:
-        for name in FIGURES:
-            value = summary.get(name)
-            columns[name].append(math.nan if value is None else float(value))
-        faults.append(str(summary['reason']) if summary['result'] == 'fault' else '')
-    return {name: np.array(values) for name, values in columns.items()}, faults
+    studies = [_in_python(entry, run) for run in runs] if entry.in_python else [simulate_many(runs, threads=threads)]
+    return ({name: np.concatenate([study[name] for study in studies]) for name in FIGURES},
+            [str(fault) for study in studies for fault in study['fault']])
+
+
+def _in_python(entry: Entry, run: dict[str, Any]) -> Study:
+    """One run of a class in Python. What the law raises is the fault that it is in a process of its own."""
+    law = entry.made()
+    try:
+        study = simulate_many([{**run, 'controller': law}], keep_going=True)
+    except Exception as error:
+        print(f'{entry.name}: {"".join(traceback.format_exception_only(error)).strip()}', file=sys.stderr)
+        return Study({**dict.fromkeys(FIGURES, np.array([math.nan])), 'fault': np.array(['controller_not_finite'], dtype=object)})
+    if study['error'][0]:
+        raise ValueError(study['error'][0])
+    return study
 
 
 def _column(heading: str, decimals: int = 0, scale: float = 1.0) -> dict[str, Any]:
