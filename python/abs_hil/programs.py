@@ -1,5 +1,6 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
 abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_rig. `abs_hil report ...` starts them too."""
+import codecs
 import contextlib
 import errno
 import importlib
@@ -14,6 +15,17 @@ PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn':
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
             'lab': 'abs_hil.lab.page', 'rig': 'abs_hil.rig', 'python_host': 'abs_hil.interchange.host'}
+
+
+#: for encodings without them
+_PLAIN = {'\u2212': b'-', '–': b'-', '×': b'x', '…': b'...'}
+
+
+def _plainly(error: UnicodeError) -> tuple[bytes, int]:
+    """What standard output gets of characters that its encoding lacks; the bytes of a file's name as they are."""
+    assert isinstance(error, UnicodeEncodeError)
+    lacking = error.object[error.start:error.end]
+    return b''.join(bytes([ord(c) & 0xFF]) if '\udc80' <= c <= '\udcff' else _PLAIN.get(c, b'?') for c in lacking), error.end
 
 
 class _Stdout(io.FileIO):
@@ -31,7 +43,8 @@ class _Stdout(io.FileIO):
 def start(name: str, arguments: list[str]) -> int:
     """Starts a program. A full disk behind stdout is status 1, whatever the program made of it."""
     raw = _Stdout(1, 'wb', closefd=False)
-    sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors=sys.stdout.errors,
+    codecs.register_error('abs_hil', _plainly)
+    sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors='abs_hil',
                                   line_buffering=bool(sys.stdout.line_buffering))
     status = _start(name, arguments)
     with contextlib.suppress(OSError):

@@ -4,6 +4,7 @@ import io
 import math
 import os
 import pathlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] i
 #: columns that hold texts
 TEXTS = ('phase', 'phase_name')
 MOST_SHOWN = 40
+#: times of a run count from its start, and none lasts 30 years
+LAST_S = 1e9
 
 
 @dataclass
@@ -65,9 +68,7 @@ def read_rows(path: str | os.PathLike[str]) -> Rows:
     except ValueError as error:
         _refuse(place, data[first:], names)
         raise ValueError(f'{place}: {error}') from None
-    time_s = columns['time_s']
-    if not np.isfinite(time_s).all() or (np.diff(time_s) < 0).any():
-        _refuse(place, data[first:], names)
+    check_times(columns['time_s'], lambda row: f'{place}:{row + 2}')
     for name in {*TEXTS} & {*columns}:
         texts = columns[name]  # few different ones
         clean = {text: _core.clean_text(str(text).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for text in set(texts)}
@@ -95,25 +96,31 @@ def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str
 
 def _refuse(place: pathlib.Path, body: bytes, names: list[str]) -> None:
     """Raises ValueError for the first line that is no row."""
-    last_s = -math.inf
     for number, line in enumerate(body.split(b'\n')[:-1], 2):
         fields = line.removesuffix(b'\r').split(b',')
         for name, field in zip(names, fields):
             try:
-                value = math.nan if name in TEXTS else float(field)
+                if name not in TEXTS:
+                    float(field)
             except ValueError:
                 shown = _core.clean_text(field, MOST_SHOWN)
                 raise ValueError(f'{place}:{number}: {name}: "{shown}" is not a number (a run writes NaN for an unknown '
                                  'value)') from None
-            if name == 'time_s':
-                time_s = value
         if len(fields) < len(names):
             raise ValueError(f'{place}:{number}: the row has {len(fields)} fields instead of {len(names)} and ends before '
                              f'{names[len(fields)]}')
         if len(fields) > len(names):
             raise ValueError(f'{place}:{number}: the row has more than the header\'s {len(names)} fields')
-        if not math.isfinite(time_s):
-            raise ValueError(f'{place}:{number}: time_s is not a finite number')
-        if time_s < last_s:
-            raise ValueError(f'{place}:{number}: time_s decreases from {last_s:g} to {time_s:g}')
-        last_s = time_s
+
+
+def check_times(time_s: np.ndarray, place: Callable[[int], str], rising: bool = True) -> None:
+    """Raises ValueError for the first of a recording's times that is none. `place` names where the row of that number is."""
+    wrong = ~((time_s >= 0.0) & (time_s <= LAST_S))
+    if rising:
+        wrong[1:] |= time_s[1:] < time_s[:-1]
+    for row in np.flatnonzero(wrong)[:1].tolist():
+        if not math.isfinite(time_s[row]):
+            raise ValueError(f'{place(row)}: time_s is not a finite number')
+        if rising and row and time_s[row] < time_s[row - 1]:
+            raise ValueError(f'{place(row)}: time_s decreases from {time_s[row - 1]:g} to {time_s[row]:g}')
+        raise ValueError(f'{place(row)}: time_s = {time_s[row]:g} is no time of a run: they lie within 0 to {LAST_S:g} s')

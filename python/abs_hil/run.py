@@ -13,7 +13,7 @@ from .files import write_whole
 from .messages import PHASES, QUANTITIES
 from .nesting import parse_json
 from .options import PathLike
-from .rows import TEXTS, read_rows
+from .rows import TEXTS, check_times, read_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -290,6 +290,7 @@ def _load_log(path: pathlib.Path) -> Run:
     if rows == 0:
         raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil'
                          + (', or another version of abs_hil recorded it' if unreadable else ''))
+    check_times(columns['time_s'], lambda row: f'{path}: message {row + 1} of its telemetry')
     name_phases(columns)
     summary: dict[str, Any] = {}
     if experiment:

@@ -54,6 +54,9 @@ class LogColumns {
       experiment_t message{};
       if (!decode(event, message)) return;
       experiment_ = {message.experiment, message.controller, message.plant, message.backend, message.config_json};
+    } else if (event.channel.ends_with("EVENT")) {
+      event_t message{};
+      decode(event, message);
     }
   }
   py::tuple result(const std::string& damage) {
@@ -113,10 +116,11 @@ py::tuple read_log(const std::string& path) {
   return columns.result(damage);
 }
 
-/// What an event log says besides the rows of read_log: numbers of its telemetry messages, and events.
+/// What an event log says besides the rows of read_log: numbers of its messages, and events.
 py::dict read_log_facts(const std::string& path) {
   std::vector<std::int64_t> cycles;
   std::vector<std::int64_t> sequences;
+  std::vector<std::int64_t> event_sequences;
   std::int64_t start_us = 0;
   std::vector<std::pair<double, event_t>> events;
   {
@@ -127,10 +131,12 @@ py::dict read_log_facts(const std::string& path) {
         telemetry_t message{};
         event_t reported{};
         if (event->channel.ends_with("TELEMETRY") && telemetry::decode_checked(event->data, message).empty()) {
-          if (cycles.empty()) start_us = event->timestamp_us - std::llround(message.time_s * 1e6);
+          if (cycles.empty() && event->timestamp_us > 0)
+            start_us = event->timestamp_us - std::llround(message.time_s * 1e6);
           cycles.push_back(message.cycle);
           sequences.push_back(message.sequence);
         } else if (event->channel.ends_with("EVENT") && telemetry::decode_checked(event->data, reported).empty()) {
+          event_sequences.push_back(reported.sequence);
           events.emplace_back(reported.time_s, reported);
         }
       }
@@ -145,6 +151,7 @@ py::dict read_log_facts(const std::string& path) {
   facts["start_us"] = start_us;
   facts["cycles"] = array_of(std::move(cycles));
   facts["sequences"] = array_of(std::move(sequences));
+  facts["event_sequences"] = array_of(std::move(event_sequences));
   facts["events"] = told;
   return facts;
 }

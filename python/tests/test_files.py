@@ -2,6 +2,7 @@
 import hashlib
 import os
 import pathlib
+import re
 import stat
 import subprocess
 import sys
@@ -98,3 +99,20 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
         with open('/dev/full', 'w') as full:
             result = subprocess.run(command(*words), stdout=full, stderr=subprocess.PIPE, text=True)
         assert result.returncode == 1 and 'cannot write to standard output' in result.stderr, result
+        assert result.stderr.count('\n') == 1, result
+    for export in ('--csv', '--json', '--octave'):
+        nobody, out = os.pipe()
+        os.close(nobody)
+        result = subprocess.run(command('report', export, tmp_path / 'run'), stdout=out, stderr=subprocess.PIPE, text=True)
+        os.close(out)
+        assert (result.returncode, result.stderr) == (0, ''), result
+
+
+def test_standard_output_gets_what_its_encoding_has(tmp_path, abs_hil_program):
+    run = tmp_path / 'rün'
+    abs_hil_program('--fast', '--no-lcm', '--out', run)
+    plain = {**os.environ, 'LC_ALL': 'C', 'PYTHONCOERCECLOCALE': '0', 'PYTHONUTF8': '0'}
+    table = subprocess.run(command('report', '--table', run), capture_output=True, env=plain)
+    assert table.returncode == 0 and re.search(rb'theta error at end +-0[.]', table.stdout), table
+    page = subprocess.run(command('report', run, '--output', run / 'page.html'), capture_output=True, env=plain)
+    assert page.stdout == os.fsencode(run / 'page.html') + b'\n', page

@@ -5,6 +5,7 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -147,29 +148,77 @@ def test_parquet(folder, tmp_path):
     assert json.loads(table.schema.metadata[b'abs_hil.summary.json']) == abs_hil.load(folder).summary
 
 
+def edited(folder, channel, sequences, change):
+    """The event log with change(bytes) in place of some messages of a channel; None leaves one out."""
+    data, made, place = (folder / 'run.lcmlog').read_bytes(), io.BytesIO(), 0
+    while place < len(data):
+        channel_size, data_size = struct.unpack_from('>II', data, place + 20)
+        begin = place + 28 + channel_size
+        message = data[begin:begin + data_size]
+        if data[place + 28:begin].decode().endswith(channel) and struct.unpack_from('>q', message, 16)[0] in sequences:
+            message = change(message)
+        if message is not None:
+            made.write(data[place:place + 24] + struct.pack('>I', len(message)) + data[place + 28:begin] + message)
+        place = begin + data_size
+    return made.getvalue()
+
+
+@pytest.mark.parametrize('change', [lambda message: message[:-3], lambda message: b'x' + message[1:], lambda message: None])
+def test_events_that_a_log_lacks_are_counted(folder, tmp_path, capsys, change):
+    (tmp_path / 'run.lcmlog').write_bytes(edited(folder, 'EVENT', [1], change))
+    converted(tmp_path / 'run.lcmlog', tmp_path)
+    out = capsys.readouterr().out
+    assert '1 events are missing in the log' in out
+    assert ('1 messages of the log cannot be read' in out) == (change(b'xxxx') is not None)
+
+
+def test_impossible_times_and_numbers_are_refused_with_their_place(folder, tmp_path, capsys):
+    def refusal(origin):
+        for name in ('run.mcap', 'run.parquet'):
+            assert program.main([str(origin), str(tmp_path / name)]) == 2 and not (tmp_path / name).exists()
+        return capsys.readouterr().err
+    log, at = tmp_path / 'run.lcmlog', {'TELEMETRY': 32, 'EVENT': 24}  # of time_s
+    for channel, place in (('TELEMETRY', 'message 101 of its telemetry'), ('EVENT', 'event 2')):
+        for time_s in (np.nan, np.inf, 1e300, -1e300, -5.0):
+            number, wrong = int(place.split()[1]) - 1, struct.pack('>d', time_s)
+            log.write_bytes(edited(folder, channel, [number], lambda message, begin=at[channel], wrong=wrong:
+                                   message[:begin] + wrong + message[begin + 8:]))
+            assert f'run.lcmlog: {place}: time_s ' in refusal(log)
+    log.write_bytes(edited(folder, 'TELEMETRY', [50], lambda message: message[:24] + b'\x80' + bytes(7) + message[32:]))
+    assert 'run.lcmlog: a message has the impossible number -9223372036854775808' in refusal(log)
+    csv = tmp_path / 'run.csv'
+    lines = (folder / 'run.csv').read_text().splitlines()
+    csv.write_text('\n'.join([*lines[:-1], '1e12' + lines[-1][lines[-1].index(','):]]) + '\n')
+    assert f'run.csv:{len(lines)}: time_s = 1e+12' in refusal(csv)
+    shutil.copytree(folder, tmp_path / 'run')
+    (tmp_path / 'run' / 'SHA256SUMS').unlink()
+    for time_s in ('1e11', '1e300', 'nan', 'x'):
+        lines = (folder / 'events.csv').read_text().splitlines()
+        lines[2] = time_s + lines[2][lines[2].index(','):]
+        (tmp_path / 'run' / 'events.csv').write_text('\n'.join(lines) + '\n')
+        assert 'events.csv:3: ' in refusal(tmp_path / 'run')
+
+
+def test_a_time_that_no_stamp_can_hold_is_a_loss(folder, tmp_path, capsys):
+    shutil.copytree(folder, tmp_path / 'run')
+    (tmp_path / 'run' / 'SHA256SUMS').unlink()
+    (tmp_path / 'run' / 'environment.json').write_text('{"date_utc": "9999-01-01T00:00:00Z"}')
+    path = converted(tmp_path / 'run', tmp_path)
+    assert 'the times begin at 1970-01-01' in capsys.readouterr().out
+    assert decoded_by_mcap_ros2(path)['/abs_hil/cycle'][0][0] == 0
+
+
 def test_lost_messages_are_counted(folder, tmp_path, capsys):
     """Without 7 messages in its middle a log has a gap, and the conversion says so."""
-    from abs_hil.messages import decode
-    data = (folder / 'run.lcmlog').read_bytes()
-    kept, place, dropped = io.BytesIO(), 0, 0
-    while place < len(data):
-        channel_size, data_size = (int.from_bytes(data[place + at:place + at + 4], 'big') for at in (20, 24))
-        end = place + 28 + channel_size + data_size
-        channel = data[place + 28:place + 28 + channel_size]
-        lost = channel.endswith(b'TELEMETRY') and 500 <= decode(data[place + 28 + channel_size:end]).sequence < 507
-        dropped += lost
-        if not lost:
-            kept.write(data[place:end])
-        place = end
-    assert dropped == 7
-    (tmp_path / 'gap.lcmlog').write_bytes(kept.getvalue())
+    kept = edited(folder, 'TELEMETRY', range(500, 507), lambda message: None)
+    (tmp_path / 'gap.lcmlog').write_bytes(kept)
     converted(tmp_path / 'gap.lcmlog', tmp_path)
     assert '7 messages of telemetry are missing' in capsys.readouterr().out
     rows = (folder / 'run.csv').read_text().splitlines()
     (tmp_path / 'gap.csv').write_text('\n'.join(rows[:900] + rows[905:]) + '\n')
     converted(tmp_path / 'gap.csv', tmp_path)
     assert 'gaps in time for 5 rows' in capsys.readouterr().out
-    (tmp_path / 'cut.lcmlog').write_bytes(kept.getvalue()[:-1000])
+    (tmp_path / 'cut.lcmlog').write_bytes(kept[:-1000])
     converted(tmp_path / 'cut.lcmlog', tmp_path)
     assert 'lost: nothing' not in capsys.readouterr().out
 

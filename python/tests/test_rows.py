@@ -67,6 +67,8 @@ def test_a_file_that_is_no_run_is_refused_with_file_and_line(tmp_path):
     assert refusal(tmp_path, HEADER + row('x') + '\n').startswith('FILE:2: time_s: "x" is not a number')
     assert refusal(tmp_path, HEADER + good + row('') + '\n').startswith('FILE:3: time_s: "" is not a number')
     assert refusal(tmp_path, HEADER + row('NaN') + '\n') == 'FILE:2: time_s is not a finite number'
+    for time in ('-5', '1e300', '1e12'):
+        assert refusal(tmp_path, HEADER + row(time) + '\n').startswith(f'FILE:2: time_s = {float(time):g} is no time of a run')
     assert refusal(tmp_path, HEADER + good + '1,brake,3\n') == ('FILE:3: the row has 3 fields instead of 19 and ends before '
                                                                'omega2_rad_s')
     assert refusal(tmp_path, HEADER + row('1') + ',9\n') == 'FILE:2: the row has more than the header\'s 19 fields'

@@ -27,7 +27,7 @@ void RunMetrics::consume(const rig::CycleRecord& record, double distance_m) {
                 braking_);
 }
 
-Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
+Metrics metrics_of(const BrakingFigures<double>& f, bool stopped) noexcept {
   Metrics result = f;
   result.slip_settling_s = f.slip_settling.since_s();
   result.theta_settling_s = f.theta_settling.since_s();
@@ -35,19 +35,20 @@ Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
     result.slip_rms = std::sqrt(f.slip_square_sum / f.samples);
     result.theta_error_rms = std::sqrt(f.theta_square_sum / f.samples);
   }
-  return result;
-}
-
-Metrics RunMetrics::metrics() const noexcept {
-  Metrics result = metrics_of(figures_);
-  if (stopped_ && std::isnan(result.stop_time_s) && figures_.deceleration_m_s2 > 0.0) {
+  const double end_speed_m_s = f.end_speed_m_s();
+  if (stopped && !f.stop_known() && f.deceleration_m_s2 > 0.0) {
     // The sequence ends on the estimated speed. The true one may cross the end speed a few cycles later.
-    const double end_speed_m_s = figures_.end_speed_m_s();
-    const double ahead_s = (result.final_speed_m_s - end_speed_m_s) / figures_.deceleration_m_s2;
+    const double ahead_s = (f.final_speed_m_s - end_speed_m_s) / f.deceleration_m_s2;
     if (ahead_s <= furthest_ahead_s) {
-      result.stop_time_s = figures_.last_time_s - result.brake_start_s + ahead_s;
-      result.stop_distance_m = figures_.last_distance_m + 0.5 * (result.final_speed_m_s + end_speed_m_s) * ahead_s;
+      result.stop_time_s = f.last_time_s - f.brake_start_s + ahead_s;
+      result.stop_distance_m = f.last_distance_m + 0.5 * (f.final_speed_m_s + end_speed_m_s) * ahead_s;
     }
+  }
+  // A braking that was cut off has no estimate at the speed that the figure names. The last one may come from the very
+  // readings that ended it.
+  const bool moves_on = f.stop_known() ? f.final_speed_m_s >= end_speed_m_s : std::isnan(result.stop_time_s);
+  if (moves_on && f.final_speed_m_s > least_judged_speed_m_s) {
+    result.theta_final_N = result.theta_error_final = rig::unknown;
   }
   return result;
 }

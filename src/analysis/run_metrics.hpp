@@ -22,7 +22,8 @@ struct MissingFigure {
 [[nodiscard]] std::vector<MissingFigure> missing_figures(const Metrics& metrics, double end_speed_m_s);
 
 /// The metrics as far as the figures know them.
-[[nodiscard]] Metrics metrics_of(const BrakingFigures<double>& figures) noexcept;
+/// @param stopped  the last record is of phase stopped, with an estimate below the end speed
+[[nodiscard]] Metrics metrics_of(const BrakingFigures<double>& figures, bool stopped = false) noexcept;
 
 /// Computes the metrics from a stream of records without storing them.
 class RunMetrics final : public rig::RecordSink {
@@ -32,7 +33,7 @@ class RunMetrics final : public rig::RecordSink {
   RunMetrics(double r2_m, double end_speed_m_s) : r2_m_(r2_m), figures_(end_speed_m_s) {}
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  [[nodiscard]] Metrics metrics() const noexcept;
+  [[nodiscard]] Metrics metrics() const noexcept { return metrics_of(figures_, stopped_); }
   /// True if the car has braked but not stopped so far, or moves again after a stop.
   [[nodiscard]] bool moves_on() const noexcept {
     if (!begun_) return false;
@@ -47,7 +48,7 @@ class RunMetrics final : public rig::RecordSink {
   BrakingFigures<double> figures_;
   bool begun_{false};
   bool braking_{false};
-  bool stopped_{false};  ///< the last record is of phase stopped, with an estimate below the end speed
+  bool stopped_{false};  ///< as in metrics_of
 };
 
 }  // namespace abs_hil::analysis

@@ -132,12 +132,11 @@ std::string to_text(const RunSummary& s) {
   }
   line("slip error",
        fmt::format("{} RMS, settled after {}", shown(m.slip_rms, 4, ""), shown(m.slip_settling_s, 3, "s")));
-  // After a fault the last estimates may come from the very readings that were wrong.
-  const bool cut_off = s.result == "fault" && m.final_speed_m_s > least_judged_speed_m_s;
   line("theta estimate",
-       cut_off ? "- (a fault ended the braking)"
-               : fmt::format("{} at {:.0f} m/s, settled after {}", shown(m.theta_final_N, 2, "N"),
-                             std::fmax(least_judged_speed_m_s, m.final_speed_m_s), shown(m.theta_settling_s, 3, "s")));
+       std::isnan(m.theta_final_N) && m.final_speed_m_s > least_judged_speed_m_s
+           ? fmt::format("- (the run ended at {:.3g} m/s)", m.final_speed_m_s)
+           : fmt::format("{} at {:.0f} m/s, settled after {}", shown(m.theta_final_N, 2, "N"),
+                         std::fmax(least_judged_speed_m_s, m.final_speed_m_s), shown(m.theta_settling_s, 3, "s")));
   if (!s.friction_curve.is_null()) {
     const auto value = [&s](const char* name) {
       return s.friction_curve[name].is_number() ? s.friction_curve[name].get<double>() : rig::unknown;

@@ -27,6 +27,16 @@ constexpr std::chrono::milliseconds stop_again{50};
 /// After its last cycle a run's slow thread ends within this time.
 constexpr std::chrono::seconds last_words{1};
 
+/// Why no command can be made for this state; empty if one can.
+std::string problem_of(const command_state_t& state) {
+  constexpr std::int64_t plausible_sequence_max = std::int64_t{1} << 53U;
+  if (state.enabled == 0)
+    return "says that the running abs_hil accepts only stop; start it with --set commands.enabled=true";
+  if (state.last_sequence >= 0 && state.last_sequence <= plausible_sequence_max) return {};
+  return "gives the impossible sequence number " + std::to_string(state.last_sequence) +
+         "; look for its forger with abs-spy, or use ttl=0";
+}
+
 /// Collects the answers of one running program.
 class Answers {
  public:
@@ -59,6 +69,7 @@ class Answers {
   std::optional<event_t> without_tag{};  ///< an answer without the key's tag
   std::optional<event_t> ending{};       ///< the event that ended the run, if it arrived while we listened
   std::optional<command_state_t> state{};
+  std::string unusable{};  ///< why no command can be made for the latest of the other states
 
  private:
   static std::span<const std::uint8_t> bytes(const lcm_recv_buf_t* received) {
@@ -76,9 +87,13 @@ class Answers {
     (counts ? answers.answer : answers.without_tag) = std::move(event);
   }
   static void on_state(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
+    auto& answers = *static_cast<Answers*>(self);
     command_state_t state{};
-    if (telemetry::decode_checked(bytes(received), state).empty()) {
-      static_cast<Answers*>(self)->state = std::move(state);
+    if (!telemetry::decode_checked(bytes(received), state).empty()) return;
+    if (std::string problem = problem_of(state); problem.empty()) {
+      answers.state = std::move(state);
+    } else {
+      answers.unusable = std::move(problem);
     }
   }
 
@@ -144,17 +159,12 @@ Reply send(const Order& order, const SenderOptions& options) {
     }
     return reply_of(answers);
   }
+  // A state has no tag, so none may end the sending.
   answers.wait(end, [&answers] { return answers.state.has_value(); });
+  if (!answers.state && !answers.unusable.empty()) {
+    return {Outcome::no_answer, "no authentic answer; ABS_COMMAND_STATE, which has no tag, " + answers.unusable};
+  }
   if (!answers.state) return reply_of(answers);
-  if (answers.state->enabled == 0) {
-    return {Outcome::refused, "the running abs_hil accepts only stop; start it with --set commands.enabled=true"};
-  }
-  constexpr std::int64_t plausible_sequence_max = std::int64_t{1} << 53U;
-  if (answers.state->last_sequence < 0 || answers.state->last_sequence > plausible_sequence_max) {
-    return {Outcome::refused, "ABS_COMMAND_STATE gives an impossible sequence number, " +
-                                  std::to_string(answers.state->last_sequence) +
-                                  ": another sender forges it; look for it with abs-spy, or use ttl=0"};
-  }
   command_t command{};
   command.session = answers.state->session;
   command.sequence = answers.state->last_sequence + 1;
@@ -169,7 +179,7 @@ Reply send(const Order& order, const SenderOptions& options) {
   // The program publishes why the run ended before it refuses the pending commands.
   if (!answered() && answers.ending) answers.wait(std::min(end, Clock::now() + last_words), answered);
   if (!answered() && answers.ending) {
-    return {Outcome::refused, "no answer, because the run ended: " + rig::clean_text(answers.ending->message, 200)};
+    return {Outcome::no_answer, "no answer, because the run ended: " + rig::clean_text(answers.ending->message, 200)};
   }
   return reply_of(answers);
 }

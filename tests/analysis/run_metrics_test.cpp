@@ -22,6 +22,7 @@ Metrics brake_to(double last_m_s, rig::Phase last_phase, double estimate_m_s = 0
     record.time_s = time_s;
     record.phase = phase;
     record.truth.speeds = {0.0, (10.0 - 5.0 * time_s) / 0.1};
+    record.truth.theta_N = record.control.theta_est_N = 20.0;
     record.control.speeds_est = {0.0, estimate / 0.1};
     metrics.consume(record, 10.0 * time_s - 2.5 * time_s * time_s);
   };
@@ -146,7 +147,7 @@ TEST_CASE("each missing figure says why, and no other") {
   for (const MissingFigure& figure : missing_figures(nothing.metrics(), 0.3)) {
     CHECK(figure.why == "the run did not brake");
   }
-  CHECK(names(nothing.metrics()).size() == 8);
+  CHECK(names(nothing.metrics()).size() == 9);
   CHECK(names(brake(on_target, exact)).empty());
   const Metrics moving = brake_to(0.36, rig::Phase::stopped);
   CHECK_THAT(why(moving, "stop_time_s"), Catch::Matchers::Contains("still moved at 0.36 m/s"));
@@ -157,6 +158,21 @@ TEST_CASE("each missing figure says why, and no other") {
   CHECK_THAT(why(unsettled, "theta_settling_s"), Catch::Matchers::Contains("5 %"));
   const Metrics silent = brake(on_target, [](double) { return std::nan(""); });
   CHECK_THAT(why(silent, "theta_final_N"), Catch::Matchers::Contains("no estimate"));
+}
+
+TEST_CASE("a braking that ends above 3 m/s has no estimate of theta there") {
+  const Metrics cut_off = brake_to(4.0, rig::Phase::fault);
+  CHECK(std::isnan(cut_off.theta_final_N));
+  CHECK(std::isnan(cut_off.theta_error_final));
+  int named = 0;
+  for (const MissingFigure& figure : missing_figures(cut_off, 0.3)) {
+    if (figure.name != "theta_final_N" && figure.name != "theta_error_final") continue;
+    CHECK_THAT(figure.why, Catch::Matchers::Contains("at 3 m/s; the run ended at 4 m/s"));
+    ++named;
+  }
+  CHECK(named == 2);
+  CHECK(brake_to(2.9, rig::Phase::fault).theta_final_N == 20.0);
+  CHECK(brake(on_target, exact, 5.0).theta_final_N == 20.0);  // it has stopped by its own end speed
 }
 
 TEST_CASE("total variation sums the steps of the torque reference") {

@@ -111,11 +111,14 @@ TEST_CASE("the text says at which speed the estimate of theta is taken") {
   CHECK_THAT(to_text(summary), Contains("23.04 N at 3 m/s"));
 }
 
-TEST_CASE("after a fault while braking the last estimate of theta is not shown") {
+TEST_CASE("text and JSON have the same estimate of theta") {
   RunSummary summary;
+  summary.metrics.brake_start_s = 1.0;
   summary.metrics.theta_final_N = 0.0;
   summary.metrics.final_speed_m_s = 16.6;
   CHECK_THAT(to_text(summary), Contains("0.00 N at 17 m/s"));
-  summary.result = "fault";
-  CHECK_THAT(to_text(summary), !Contains("0.00 N") && Contains("theta estimate        - (a fault ended the braking)"));
+  CHECK(to_json(summary)["theta_final_N"] == 0.0);
+  summary.metrics.theta_final_N = abs_hil::rig::unknown;
+  CHECK_THAT(to_text(summary), Contains("theta estimate        - (the run ended at 16.6 m/s)"));
+  CHECK_THAT(to_json(summary)["missing"]["theta_final_N"].get<std::string>(), Contains("ended at 16.6 m/s"));
 }

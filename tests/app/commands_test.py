@@ -143,6 +143,7 @@ def live_changes(folder, key):
     time.sleep(6.4)
     found, said = send('gain', 'ka1', '3')
     check(found == 0, 'a gain changes during the run', said)
+    forged_states(wire, state.session)
     check(send('start')[0] == 1, 'a second start is refused')
     check(run.end() == 0, 'the run goes to its end', run.output)
     reasons = [m.reason for m in run.answers if 'wire' in m.message]
@@ -153,10 +154,23 @@ def live_changes(folder, key):
     check(refs == {0.2}, 'the slip reference was followed', refs)
 
 
+def forged_states(wire, session):
+    """A state that a forger sends beside the run's does not end the sending."""
+    for enabled, last_sequence in ((False, 0), (True, -1), (True, (1 << 63) - 1)):
+        state = abs_hil.command_state_t()
+        state.session, state.enabled, state.last_sequence = session, enabled, last_sequence
+        sender = subprocess.Popen([PROGRAM, 'send', *KEY, 'gain', 'ka1', '3'], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                  text=True)
+        while sender.poll() is None:
+            wire.message(b'ABS_COMMAND_STATE', state.encode())
+            time.sleep(0.02)
+        check(sender.returncode == 0, 'a forged state does not end the sending', *sender.communicate())
+
+
 def not_enabled(folder):
     run = Run(folder)
     found, said = send('slip-ref', '0.2')
-    check(found == 1 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
+    check(found == 3 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
     stop = subprocess.run([PROGRAM, 'send', 'stop'], capture_output=True, text=True, timeout=30)
     check(stop.returncode == 0 and 'stop accepted' in stop.stdout and 'not authenticated' in stop.stderr, 'stop needs no key',
           stop)
@@ -205,7 +219,7 @@ def run_ends_meanwhile():
     wire.message(b'ABS_EVENT', end.encode())
     started = time.monotonic()
     said = ''.join(sender.communicate(timeout=30))
-    check(sender.returncode == 1 and 'the run ended: brake -> stopped: all done' in said, 'send says that the run ended',
+    check(sender.returncode == 3 and 'the run ended: brake -> stopped: all done' in said, 'send says that the run ended',
           sender.returncode, said)
     check(time.monotonic() - started < 15, 'send does not wait after the end of the run')
 

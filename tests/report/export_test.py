@@ -38,6 +38,10 @@ class Export(ReportTest):
             for column in ('time_s', 'slip', 'theta_est_N', 'distance_m', 'motor_enable'):
                 self.assertEqual(struct.pack('d', float(row[column])), struct.pack('d', float(wanted[column])))
 
+    def test_a_mat_file_goes_into_a_pipe(self):
+        runs = scipy.io.loadmat(io.BytesIO(self.report('--octave', self.runs[0]).stdout))['runs']
+        self.assertEqual(len(runs[0, 0]['time_s']), len(self.rows(self.runs[0])))
+
     def test_columns_are_chosen(self):
         lines = self.report('--csv', '--columns', 'time_s,slip', *self.runs).stdout.decode().splitlines()
         self.assertEqual(lines[0], 'run,time_s,slip')

@@ -415,6 +415,8 @@ class Files(ReportTest):
             self.assertIn(says, self.report(*args, status=2).stderr.decode())
         self.assertEqual(list(self.folder.glob('*.html')), [])
         self.report(a, '--window', '-5:1')
+        said = self.report(a, '--window', '100:200', '--force', status=2).stderr.decode()
+        self.assertRegex(said, r'--window 100:200 holds no row; give seconds within 0:\d')
 
     def test_row_cut_off_by_a_crash_is_left_out_and_said(self):
         a = self.make_run('a')
@@ -451,6 +453,12 @@ class Files(ReportTest):
                                 env={'PATH': str(self.folder)})
         self.assertEqual(result.returncode, 3)
         self.assertIn('python3-abs-hil', result.stderr)
+
+    def test_a_value_beyond_single_precision(self):
+        a = self.make_run('a', '--set', 'experiment.start_speed_rad_s=60')
+        rows = iter(range(10 ** 6))
+        self.rewrite(a, lambda row: row.update(brake_torque_Nm='1e308', slip_ref='-1e308') if next(rows) == 50 else None)
+        self.assertNotIn('Warning', self.page(a, '--figures', self.folder / 'figures')[1])
 
     def test_nothing_half_written(self):
         a = self.make_run('a')

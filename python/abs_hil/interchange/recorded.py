@@ -1,9 +1,9 @@
 """Recorded runs: their rows with everything that stands beside them and what is missing, converted for other tools."""
-import csv
 import dataclasses
 import datetime
 import json
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from ..core import _core
 from ..messages import PHASES, QUANTITIES, REASONS
 from ..nesting import parse_json
+from ..report.files import read_events
+from ..rows import check_times
 from ..run import COLUMNS, Run, load
 from .messages import McapFile
 
@@ -19,6 +21,10 @@ CYCLE_TYPE, SIGNALS_TYPE = 'abs_hil/msg/Cycle', 'abs_hil/msg/Signals'
 #: kinds of events and their levels in a log
 LEVELS = {'phase': 20, 'command': 20, 'limit': 30, 'fault': 40}
 MEDIA_TYPES = {'.json': 'application/json', '.toml': 'application/toml', '.csv': 'text/csv'}
+#: ROS 2's stamps hold no later time
+LAST_NS = (2 ** 31 - 1) * 10 ** 9
+#: a run's messages count from 0, and none makes more
+LAST_NUMBER = 10 ** 13
 #: files of a run folder that go with its rows
 ATTACHED = ('config.toml', 'experiment.toml', 'summary.json', 'environment.json', 'events.csv')
 
@@ -98,6 +104,10 @@ def read(path: str) -> Source:
     for figure in ('telemetry_drops', 'csv_rows_lost'):
         if run.summary.get(figure):
             source.losses.append(f'the run itself counted {figure} = {run.summary[figure]}')
+    latest_s = max([float(run['time_s'][-1]), *(event.time_s for event in source.events)])
+    if not 0 <= source.start_ns <= LAST_NS - latest_s * 1e9:
+        source.losses.append(f'no stamp holds its start, Unix time {source.start_ns // 10 ** 9} s: the times begin at 1970-01-01')
+        source.start_ns = 0
     return source
 
 
@@ -123,28 +133,37 @@ def _read_folder(folder: pathlib.Path, source: Source) -> None:
     except (ValueError, AttributeError):
         source.losses.append('environment.json cannot be read: the times begin at 1970-01-01')
     if 'events.csv' in source.attachments:
-        text = source.attachments['events.csv'].decode(errors='replace')
-        for row in csv.DictReader(text.splitlines()):
-            source.events.append(Event(float(row['time_s']), row['event'], f'{row["phase_name"]}: {row["reason"]}'))
+        events = [Event(one.time_s, one.event, f'{one.name or one.phase}: {one.reason}')
+                  for one in read_events(folder / 'events.csv')]
+        _add_events(source, events, lambda number: f'{folder / "events.csv"}:{number + 2}')
+
+
+def _add_events(source: Source, events: list[Event], place: Callable[[int], str]) -> None:
+    check_times(np.array([event.time_s for event in events]), place, rising=False)
+    source.events.extend(events)
 
 
 def _read_log_facts(path: pathlib.Path, source: Source) -> None:
     facts: dict[str, Any] = _core.read_log_facts(str(path))
-    if facts['start_us'] > 0:
-        source.start_ns = facts['start_us'] * 1000
+    for name in ('cycles', 'sequences', 'event_sequences'):
+        for number in facts[name][~((facts[name] >= 0) & (facts[name] <= LAST_NUMBER))][:1].tolist():
+            raise ValueError(f'{path}: a message has the impossible number {number} among its {name}')
+    source.start_ns = max(facts['start_us'], 0) * 1000
     lost = _gaps(facts['sequences'], 1)
     if lost:
         source.losses.append(f'{lost} messages of telemetry are missing in the log')
+    if events_lost := _gaps(facts['event_sequences'], 1):
+        source.losses.append(f'{events_lost} events are missing in the log')
     cycles = np.diff(facts['cycles'])
     if len(cycles):
         every = int(np.median(cycles))
         dropped = _gaps(facts['cycles'], every) - lost
         if dropped > 0:
             source.losses.append(f'{dropped} cycles have no message, although every {every} of them should have one')
-    for time_s, kind, reason, message in facts['events']:
-        words = message.decode(errors='replace')
-        source.events.append(Event(time_s, kind.decode(errors='replace'),
-                                   words or str(REASONS.get(reason, {}).get('text', reason))))
+    events = [Event(time_s, kind.decode(errors='replace'),
+                    message.decode(errors='replace') or str(REASONS.get(reason, {}).get('text', reason)))
+              for time_s, kind, reason, message in facts['events']]
+    _add_events(source, events, lambda number: f'{path}: event {number + 1}')
 
 
 def _gaps(numbers: np.ndarray, step: int) -> int:

@@ -22,6 +22,7 @@ MOST_STRIPS = 12
 STRIP_CHARACTERS = 16
 MOST_BARS = 60  # of a run; more would be unreadable
 DOUBLE_PX = 165.0
+MOST_DRAWN = 1e30  # axes are drawn in single precision
 PX_A_MARK = 34.0
 REFERENCE, SECOND = Style('#000000', (2, 3), 1.1), Style('#D55E00', (7, 4), 1.3)
 TIME = Label('time since the start of the run, <i>t</i> / s', 'time since the start of the run, $t$ / s')
@@ -108,7 +109,9 @@ def profiles_of(rows: Rows, found: Survey, window: Window, most_stretches: int) 
         inside = slice(int(np.searchsorted(time, part.from_s)), int(np.searchsorted(time, part.to_s, 'right')))
         values = rows.columns[column][inside]
         if minus:
-            values = values - rows.columns[minus][inside]
+            with np.errstate(over='ignore', invalid='ignore'):
+                values = values - rows.columns[minus][inside]
+        values = np.where(np.abs(values) < MOST_DRAWN, values, np.nan)
         if braking_only:
             values = np.where(braking[inside], values, np.nan)
         relevant = values[judged[inside] & np.isfinite(values)]
@@ -348,15 +351,20 @@ def run_figures(runs: list[RunFiles], options: Options,
                 progress: Callable[[int, int], None] | None) -> tuple[list[Survey], list[Figure]]:
     """The surveys and figures of all runs. Each CSV is read once, and again only if some runs do not brake."""
     surveys, windows, profiles = [], [], []
+    shown = False
     stretches = min(max(STRETCHES_OF_ALL_RUNS // max(len(runs), 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
     for number, run in enumerate(runs, 1):
         rows = read_rows(run.csv)
         found = survey(run, rows)
         surveys.append(found)
         windows.append(window_of(found, options.choice, found.brakes))
+        shown |= bool(((rows.time_s >= windows[-1].from_s) & (rows.time_s <= windows[-1].to_s)).any())
         profiles.append(profiles_of(rows, found, windows[-1], stretches))
         if progress is not None:
             progress(number, len(runs))
+    if not shown:
+        raise ValueError(f'--window {windows[0].from_s:g}:{windows[0].to_s:g} holds no row; give seconds within '
+                         f'{min(found.from_s for found in surveys):g}:{max(found.to_s for found in surveys):g}')
     braking = options.choice.kind == 'brake' and all(found.brakes for found in surveys)
     if options.choice.kind == 'brake' and not braking:
         for number, found in enumerate(surveys):

@@ -120,7 +120,7 @@ def read_events(path: pathlib.Path) -> list[Event]:
         fields: list[str] = next(csv.reader(io.StringIO(line)), [])
         try:
             time_s = float(fields[0])
-            events.append(Event(time_s, clean(fields[1], 40), clean(fields[2], 40), clean(fields[3]),
+            events.append(Event(time_s, clean(fields[1], 40), clean(fields[2], 40), clean(fields[3], 1000),
                                 clean(fields[4].rstrip('\r'), 40), clean(''.join(fields[5:6]).rstrip('\r'), 40)))
         except (IndexError, ValueError):
             if last:

@@ -1,5 +1,7 @@
 """The command line of abs_report."""
 import argparse
+import contextlib
+import io
 import pathlib
 import re
 import sys
@@ -94,8 +96,11 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
     else:
         if o.export in ('octave', 'parquet') and sys.stdout.isatty():
             raise ValueError(f'--{o.export} writes a binary file: give --output FILE or redirect stdout')
-        exporter.write(o.export, sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        whole = io.BytesIO()  # a MAT-file is not written in one go
+        exporter.write(o.export, whole)
+        with contextlib.suppress(OSError):  # abs_hil.programs tells it
+            sys.stdout.buffer.write(whole.getbuffer())
+            sys.stdout.buffer.flush()
     _say(exporter.notes)
 
 
