@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "config/config_error.hpp"
@@ -150,6 +151,21 @@ double highest(const experiment::Profile& profile, double constant) {
   return most;
 }
 
+/// What has passed in the phase at least when its condition holds: the time (`kind` is duration) or the distance.
+double passed_at(const experiment::EndCondition& end, EndKind kind) {
+  const bool counts = end.kind == kind || (end.kind == EndKind::upper_wheel_peak && kind == EndKind::duration);
+  double least = counts ? end.value : 0.0;
+  for (const experiment::EndCondition& part : end.parts) least = std::max(least, passed_at(part, kind));
+  return least;
+}
+
+/// The same at the end of the phase, which any of its conditions may bring.
+double passed_in(const experiment::PhasePlan& phase, EndKind kind) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const experiment::EndCondition& end : phase.ends_on) least = std::min(least, passed_at(end, kind));
+  return least;
+}
+
 }  // namespace
 
 double value_of(const Script& script, const Number& number, const KeyTable& keys) {
@@ -251,6 +267,28 @@ std::vector<std::string> beyond_limits(const Plan& plan, const Settings& s) {
       }
     }
   }
+  return problems;
+}
+
+std::vector<std::string> certain_faults(const Plan& plan) {
+  std::vector<std::string> problems;
+  const auto compare = [&](const std::string& what, double least, std::string_view limit, double most,
+                           std::string_view unit) {
+    constexpr double rounding = 1e-9;  // of the sums
+    if (least <= most * (1.0 + rounding)) return;
+    problems.push_back(fmt::format("{} at least {:.6g} {}, but {} is {:.6g} {}: every run ends as a fault; change one",
+                                   what, least, unit, limit, most, unit));
+  };
+  double time_s = 0.0;
+  double distance_m = 0.0;
+  for (const experiment::PhasePlan& phase : plan.phases) {
+    const double lasts_s = passed_in(phase, EndKind::duration);
+    compare(fmt::format("phase \"{}\" lasts", phase.name), lasts_s, "its at_most_s", phase.time_limit_s, "s");
+    time_s += lasts_s;
+    distance_m += passed_in(phase, EndKind::distance);
+  }
+  compare("the run lasts", time_s, "limits.run_time_s", plan.limits.run_time_s, "s");
+  compare("the car goes", distance_m, "limits.distance_m", plan.limits.distance_m, "m");
   return problems;
 }
 

@@ -40,4 +40,8 @@ void apply(const Script& script, config::Settings& settings);
 /// stays within the limits.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& settings);
 
+/// Describes which limits of time and distance every run of the plan must exceed, so that it ends as a fault; empty:
+/// none.
+[[nodiscard]] std::vector<std::string> certain_faults(const Plan& plan);
+
 }  // namespace abs_hil::config

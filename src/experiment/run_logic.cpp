@@ -99,10 +99,9 @@ void RunLogic::exchange_state(rig::StateBytes& state) {
   state(start_given_, answered_, end_, stands_still_, wheels_sound_, started_, start_ns_, last_ns_);
 }
 
-runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
-  options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);
-  if (!ideal_actuator_) options.brake_duty_max = rig::duty_at_most(options.brake_duty_max, duty_steps_);
-  return options;
+runtime::SendableDuties RunLogic::sendable(const runtime::GateOptions& options) const noexcept {
+  return {.motor = rig::duty_at_most(options.motor_duty_max, duty_steps_),
+          .brake = rig::duty_at_most(options.brake_duty_max, ideal_actuator_ ? 0 : duty_steps_)};
 }
 
 void RunLogic::estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept {

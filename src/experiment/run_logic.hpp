@@ -70,12 +70,13 @@ class RunLogic final : public runtime::CycleLogic {
   /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics. Its caps
   /// are duties that the driver can send, so that no rounding exceeds them.
   [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(on_grid(options), sequence_.permissions(),
-                                runtime::plausibility_limits(identity_, ideal_actuator_, options), identity_.brake.u0);
+    return runtime::CommandGate(options, sequence_.permissions(),
+                                runtime::plausibility_limits(identity_, ideal_actuator_, options), identity_.brake.u0,
+                                sendable(options));
   }
   /// The same gate, but it does not judge the motion of the wheels.
   [[nodiscard]] runtime::CommandGate make_gate_without_wheels(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(on_grid(options), sequence_.permissions(), {}, identity_.brake.u0);
+    return runtime::CommandGate(options, sequence_.permissions(), {}, identity_.brake.u0, sendable(options));
   }
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
@@ -96,7 +97,7 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return adjustments_; }
 
  private:
-  [[nodiscard]] runtime::GateOptions on_grid(runtime::GateOptions options) const noexcept;
+  [[nodiscard]] runtime::SendableDuties sendable(const runtime::GateOptions& options) const noexcept;
   void adjust(rig::CycleRecord& record) noexcept;
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;

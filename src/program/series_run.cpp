@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "abs_hil/driver/io_result.hpp"
 #include "commands/authority.hpp"
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
@@ -245,18 +246,31 @@ class SeriesRun {
     request.stop_was_sent = [this] { stopped_ = true; };
     request.outputs.run_folder.reset();
     request.outputs.no_run_folder = true;
-    if (folder_ != nullptr) request.outputs.run_folder = folder_->begin(i).string();
-    const int status = run(request);
-    if (is_interrupted(status)) {
-      interrupted_ = status;
-      return;
+    bool moved = k > 0;
+    try {
+      if (folder_ != nullptr) request.outputs.run_folder = folder_->begin(i).string();
+      const int status = run(request);
+      moved = true;
+      if (is_interrupted(status)) {
+        interrupted_ = status;
+        return;
+      }
+      if (folder_ != nullptr && !folder_->end(i, status == exit_completed ? completed : "fault")) return lose(i);
+      if (status != exit_completed) {
+        ++ended_early_;
+        // After a fault of the rig or a stop command a person must look before anything moves again.
+        if (base_.settings.backend == "rig") halted_by_ = i + 1;
+      }
+    } catch (const driver::Unavailable&) {
+      throw;
+    } catch (const telemetry::LcmError&) {
+      throw;
+    } catch (const std::exception& error) {
+      // As an error of the usage it would say that nothing has moved.
+      if (!moved) throw;
+      spdlog::error("{}", error.what());
+      return lose(i);
     }
-    if (status != exit_completed) {
-      ++ended_early_;
-      // After a fault of the rig or a stop command a person must look before anything moves again.
-      if (base_.settings.backend == "rig") halted_by_ = i + 1;
-    }
-    if (folder_ != nullptr) folder_->end(i, status == exit_completed ? completed : "fault");
     progress_.count(what);
     if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0 && !stopped_) {
       progress_.show(what, fmt::format("ended; pause of {:.6g} s before the next run", pause_s_), true);
@@ -264,6 +278,12 @@ class SeriesRun {
       if (reason == rig::Reason::none) progress_.paused();
       if (reason == rig::Reason::stop_command) stopped_ = true;
     }
+  }
+
+  /// Ends the series: the next run would lose its record, too.
+  void lose(std::size_t i) {
+    lost_ = true;
+    halted_by_ = i + 1;
   }
 
   /// True if some runs were not done.
@@ -280,7 +300,8 @@ class SeriesRun {
     std::string why = "interrupted";
     if (interrupted_ == 0) {
       why = stopped_ ? "ended by a stop command"
-                     : fmt::format("ended because {} ended early", run_folder::SeriesFolder::name_of(halted_by_ - 1));
+                     : fmt::format("ended because {} {}", run_folder::SeriesFolder::name_of(halted_by_ - 1),
+                                   lost_ ? "has no complete record" : "ended early");
     }
     return fmt::format(
         "series {}: {} with {} of {} runs done, {} ended early{}{}", base_.script->name, why, progress_.done(),
@@ -298,7 +319,8 @@ class SeriesRun {
   std::atomic<std::size_t> ended_early_{0};
   std::atomic<int> interrupted_{0};
   std::atomic<bool> stopped_{false};       ///< a stop command arrived, during a run or between two runs
-  std::atomic<std::size_t> halted_by_{0};  ///< number of the run on the rig that ended early, from 1; 0: none
+  std::atomic<bool> lost_{false};          ///< the record of a run is not complete
+  std::atomic<std::size_t> halted_by_{0};  ///< number of the run that ended the series, from 1; 0: none
 };
 
 }  // namespace

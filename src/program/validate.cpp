@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -33,7 +34,8 @@ int validate(const config::Sources& sources) {
     return status;
   }
   const config::Plan plan = config::plan(script, s);
-  const std::vector<std::string> problems = config::beyond_limits(plan, s);
+  std::vector<std::string> problems = config::beyond_limits(plan, s);
+  std::ranges::move(config::certain_faults(plan), std::back_inserter(problems));
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
   // Find errors that appear only when a run is made.

@@ -62,11 +62,10 @@ void SeriesFolder::read_index(const std::string& identity) {
                     path_.string(), series_index));
   }
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    // The run folders decide: a killed program may leave the index one run behind.
-    const bool there = fs::is_directory(path_ / name_of(i));
-    const std::string status = text_of(json["runs"][i], "status").value_or("");
-    if (there) check_seal(path_ / name_of(i));
-    if (there) runs_[i].status = status == "planned" ? "completed" : status;
+    // The run folders decide: a killed program may leave the index one run ahead.
+    if (!fs::exists(path_ / name_of(i) / file::checksums)) continue;
+    check_seal(path_ / name_of(i));
+    runs_[i].status = text_of(json["runs"][i], "status").value_or("");
   }
 }
 
@@ -89,21 +88,26 @@ std::string SeriesFolder::status(std::size_t run) const {
 
 fs::path SeriesFolder::begin(std::size_t run) {
   fs::path part = path_ / (name_of(run) + ".part");
-  if (fs::exists(part)) {
+  for (const fs::path& old : {part, path_ / name_of(run)}) {
+    if (!fs::exists(old)) continue;
     fs::path kept;
     for (int i = 1; kept.empty() || fs::exists(kept); ++i) {
       kept = path_ / fmt::format("{}.interrupted-{}", name_of(run), i);
     }
-    move_to(part, kept);
+    move_to(old, kept);
   }
   return part;
 }
 
-void SeriesFolder::end(std::size_t run, const std::string& status) {
+bool SeriesFolder::end(std::size_t run, const std::string& status) {
+  const fs::path part = path_ / (name_of(run) + ".part");
+  if (!fs::exists(part / file::checksums)) return false;
   const std::scoped_lock lock(mutex_);
-  move_to(path_ / (name_of(run) + ".part"), path_ / name_of(run));
   runs_.at(run).status = status;
+  // First: the folder alone does not tell the status of its run.
   write_index();
+  move_to(part, path_ / name_of(run));
+  return true;
 }
 
 }  // namespace abs_hil::run_folder

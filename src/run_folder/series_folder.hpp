@@ -23,8 +23,9 @@ struct SeriesEntry {
 };
 
 /// The folder of a series of runs: series.json and one whole run folder for each run: run-0001/, run-0002/, ... A run
-/// writes into run-0001.part/, which is renamed when it is complete. Opened again for the same series, it continues
-/// where it stopped and keeps an interrupted run's files beside it as run-0001.interrupted-1/. Thread-safe.
+/// writes into run-0001.part/, which is renamed when it is complete, with its SHA256SUMS. Opened again for the same
+/// series, it continues where it stopped and keeps an incomplete run's files beside it as run-0001.interrupted-1/.
+/// Thread-safe.
 class SeriesFolder {
  public:
   /// @param identity  digest of the series' content: a folder of another series is refused
@@ -34,7 +35,7 @@ class SeriesFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] bool resumed() const noexcept { return resumed_; }
-  /// True if the run has ended and its folder is kept.
+  /// True if the run has ended and its folder is complete.
   [[nodiscard]] bool done(std::size_t run) const;
   /// The run's status; "planned" if it has not ended.
   [[nodiscard]] std::string status(std::size_t run) const;
@@ -42,8 +43,9 @@ class SeriesFolder {
   [[nodiscard]] static std::string name_of(std::size_t run);
   /// Returns a new, empty place for the run's files. Throws FolderError.
   [[nodiscard]] std::filesystem::path begin(std::size_t run);
-  /// Renames the run's complete folder and records its status in the index. Throws FolderError.
-  void end(std::size_t run, const std::string& status);
+  /// Records the run's status in the index and renames its folder. Throws FolderError and files::FileError.
+  /// @return false if its record is not complete: then the run must be repeated
+  [[nodiscard]] bool end(std::size_t run, const std::string& status);
 
  private:
   void read_index(const std::string& identity);

@@ -96,10 +96,10 @@ void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpe
   }
 }
 
-double CommandGate::limited(double duty, double most, GateAction action) noexcept {
+double CommandGate::limited(double duty, double most, double sendable, GateAction action) noexcept {
   const double within = std::clamp(duty, 0.0, most);
   if (within != duty) note(action);
-  return within;
+  return std::min(within, sendable);
 }
 
 double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
@@ -151,8 +151,10 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
   command = faulty ? after_fault(wanted, input.now_ns) : wanted;
   if (!faulty || rig::acts(command)) {
     command.brake_torque_Nm = std::max(0.0, command.brake_torque_Nm);
-    command.brake_duty = limited(command.brake_duty, options_.brake_duty_max, GateAction::brake_clamped);
-    command.motor_duty = limited(command.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
+    command.brake_duty =
+        limited(command.brake_duty, options_.brake_duty_max, sendable_.brake, GateAction::brake_clamped);
+    command.motor_duty =
+        limited(command.motor_duty, options_.motor_duty_max, sendable_.motor, GateAction::motor_clamped);
     // The first command is not rate-limited: the outputs have been 0 for longer than any rise takes.
     if (has_sent_) {
       const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;

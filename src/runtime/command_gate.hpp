@@ -29,6 +29,12 @@ inline constexpr double rounded_down_most = 0.5 / 255.0;
 /// Tolerance for rounding: a step exactly at the limit must pass.
 inline constexpr double rise_rounding = 1e-9;
 
+/// The largest duties that the driver can send.
+struct SendableDuties {
+  double motor{1.0};
+  double brake{1.0};
+};
+
 /// Inputs of the gate besides the command.
 struct GateInput {
   rig::WheelSpeeds speeds{};  ///< estimated from the latest measurement
@@ -50,9 +56,13 @@ class CommandGate : public RunLatch {
   /// @param permissions which actuators each phase allows
   /// @param limits      bounds for the plausibility checks; not `enabled`: the wheels are not checked
   /// @param brake_free_duty  brake duty that gives no torque, u0 of (7): a rise of torque begins there
+  /// @param sendable  what passes at most, so that no rounding exceeds the limits; to lower a duty to it is no
+  ///   intervention
   explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
-                       const PlausibilityLimits& limits = {}, double brake_free_duty = 0.0) noexcept
+                       const PlausibilityLimits& limits = {}, double brake_free_duty = 0.0,
+                       const SendableDuties& sendable = {}) noexcept
       : options_(options),
+        sendable_(sendable),
         judge_within_ns_(static_cast<std::int64_t>(options.judge_within_s * static_cast<double>(rig::ns_per_s))),
         permissions_(permissions),
         brake_free_duty_(brake_free_duty),
@@ -96,7 +106,7 @@ class CommandGate : public RunLatch {
   /// Latches a fault when the checks of the wheels have given no verdict for `judge_within_s` while an output was on.
   void require_verdict(std::int64_t now_ns) noexcept;
   void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
-  [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
+  [[nodiscard]] double limited(double duty, double most, double sendable, GateAction action) noexcept;
   [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
                               GateAction action) noexcept;
   [[nodiscard]] rig::Command after_fault(const rig::Command& wanted, std::int64_t now_ns) noexcept;
@@ -104,6 +114,7 @@ class CommandGate : public RunLatch {
   void note(GateAction action) noexcept;
 
   GateOptions options_;
+  SendableDuties sendable_;
   std::int64_t judge_within_ns_;
   PhasePermissions permissions_;
   double brake_free_duty_;

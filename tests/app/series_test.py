@@ -2,6 +2,7 @@
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 import time
@@ -84,6 +85,28 @@ class Series(ProgramTest):
         self.assertEqual(result.returncode, 2)
         self.assertIn('another series', result.stderr)
 
+    def test_a_run_that_lost_its_record_is_repeated(self):
+        out = self.folder / 'out'
+        script = self.script(SHORT.replace('0.01', '5') + '[series]\nrepeat = 3\n')
+        command = ('--fast', '--no-lcm', '--experiment', script, '--out', out)
+
+        def loses(words, **more):
+            result = self.run_program(*command, **more)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn(words, result.stderr)
+            self.assertRegex(result.stdout, 'ended because run-000. has no complete record with . of 3 runs done, '
+                             f'0 ended early, in {out}; to continue, repeat')
+            self.assertNotIn('fault', str(self.index(out)))
+
+        loses('recorded data was lost', preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)))
+        (out / 'run-0003.part').symlink_to('nowhere')  # no run can write there
+        loses('run-0003.part')
+        (out / 'run-0003.part').unlink()
+        self.assertEqual(self.run_program(*command).returncode, 0)
+        self.assertEqual({run['status'] for run in self.index(out)}, {'completed'})
+        self.assertTrue((out / 'run-0001.interrupted-1' / 'summary.json').exists())
+        self.assertTrue((out / 'run-0001' / 'SHA256SUMS').exists())
+
     def test_progress_and_what_it_came_to(self):
         script = self.script(SHORT + '[series]\nrepeat = 20\n')
         result = self.fast('--experiment', script, '--out', self.folder / 'out')
@@ -132,6 +155,10 @@ class Series(ProgramTest):
         result = self.run_program('validate', strong, '--backend', 'rig', '--set', 'driver.kind=pci')
         self.assertEqual(result.returncode, 2, result.stdout)
         self.assertIn('more than 4.458 N m', result.stderr)
+        long = self.script('[[phase]]\nname = "a"\nuntil = { lasts_s = 1 }\n[limits]\nrun_time_s = 0.5\n')
+        result = self.run_program('validate', long)
+        self.assertEqual(result.returncode, 2, result.stdout)
+        self.assertIn('mine.toml: the run lasts at least 1 s, but limits.run_time_s is 0.5 s', result.stderr)
 
     def test_simulation_only_events_are_refused_on_the_rig_by_name(self):
         jump = self.run_program('--backend', 'rig', '--no-lcm', '--experiment', 'friction-jump')

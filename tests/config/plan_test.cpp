@@ -126,6 +126,26 @@ TEST_CASE("values beyond the rig's limits are named with phase, value and limit"
   CHECK(beyond_limits(plan(script, s), s).empty());
 }
 
+TEST_CASE("limits that every run must exceed are named") {
+  const auto faults = [](const std::string& ends, const std::string& limits) {
+    std::string script;
+    for (const char* name : {"a", "b"}) script += "[[phase]]\nname = \"" + std::string(name) + "\"\n" + ends + "\n";
+    return certain_faults(plan(parsed(script + "[limits]\n" + limits), {}));
+  };
+  const auto late = faults("until = { lasts_s = 5 }\nat_most_s = 3", "");
+  REQUIRE(late.size() == 2);
+  CHECK(late[1] == "phase \"b\" lasts at least 5 s, but its at_most_s is 3 s: every run ends as a fault; change one");
+  CHECK(faults("until = { lasts_s = 3 }\nat_most_s = 3", "run_time_s = 6").empty());
+  CHECK_THAT(faults("until = { lasts_s = 0.3 }", "run_time_s = 0.5").at(0), Contains("run lasts at least 0.6 s"));
+  CHECK_THAT(faults("until = { distance_m = 2 }\nat_most_s = 3", "distance_m = 3").at(0),
+             Contains("goes at least 4 m"));
+  // Any of several may end a phase; of `all` the last one does.
+  const std::string more = "[{ lasts_s = 2 }, { distance_m = 2 }, { upper_wheel_peak_s = 2 }]\nat_most_s = 1";
+  CHECK(faults("until.any = " + more, "run_time_s = 1\ndistance_m = 1").empty());
+  CHECK(faults("until.all = " + more, "run_time_s = 1\ndistance_m = 1").size() == 4);
+  CHECK(faults("until = { upper_wheel_peak_s = 2 }\nat_most_s = 1", "").size() == 2);
+}
+
 TEST_CASE("friction events make a profile; the configuration's own stays") {
   const std::string event = "[[event]]\nat_s = 1\nfriction = 0.5\ncounted_from = \"braking\"\n";
   const Script script = parsed(std::string(brake) + event +

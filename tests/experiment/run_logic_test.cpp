@@ -39,6 +39,14 @@ TEST_CASE("the torque estimate follows the sent command, not the wanted one") {
   CHECK(record.control.brake_torque_est_Nm == 0.0);
 }
 
+TEST_CASE("a duty at its limit is no intervention, and the output stays below the limit") {
+  RunLogic logic(logic_parts(braking("adaptive")));
+  runtime::CommandGate gate = logic.make_gate({.brake_duty_max = 0.5});
+  const runtime::GateResult result = gate.check({.brake_duty = 0.5}, {.phase = rig::Phase::brake});
+  CHECK(result.action == runtime::GateAction::passed);
+  CHECK(result.command.brake_duty == 2047.0 / 4095.0);
+}
+
 namespace {
 
 /// Records its inputs.

@@ -19,7 +19,8 @@ std::vector<SeriesEntry> three() { return {{.seed = 1}, {.seed = 2}, {.seed = 3}
 void do_run(SeriesFolder& series, std::size_t i, const std::string& status) {
   const RunFolder run(series.begin(i));
   run.write("run.csv", std::string_view("x"));
-  series.end(i, status);
+  run.seal();
+  CHECK(series.end(i, status));
 }
 
 }  // namespace
@@ -47,15 +48,47 @@ TEST_CASE("a series of runs continues where it stopped, and keeps the files of a
   CHECK(index["runs"][2]["seed"] == 3);
 }
 
+TEST_CASE("a run without a complete record is repeated, and its files are kept") {
+  const TemporaryFolder place;
+  const fs::path path = place.path / "series";
+  {
+    SeriesFolder series(path, "id", "paper", three());
+    RunFolder(series.begin(0)).write("run.csv", std::string_view("half"));
+    CHECK_FALSE(series.end(0, "fault"));
+    CHECK_FALSE(series.done(0));
+    do_run(series, 1, "fault");
+    do_run(series, 2, "completed");
+    fs::remove(path / "run-0002" / file::checksums);
+  }
+  SeriesFolder series(path, "id", "paper", three());
+  CHECK_FALSE(series.done(0));
+  CHECK_FALSE(series.done(1));
+  CHECK(series.done(2));
+  do_run(series, 0, "completed");
+  do_run(series, 1, "completed");
+  CHECK(fs::exists(path / "run-0001.interrupted-1" / "run.csv"));
+  CHECK(fs::exists(path / "run-0002.interrupted-1" / "run.csv"));
+  CHECK(fs::exists(path / "run-0002" / file::checksums));
+}
+
+TEST_CASE("the index knows the status of a run before its folder is complete") {
+  const TemporaryFolder place;
+  const fs::path path = place.path / "series";
+  SeriesFolder series(path, "id", "paper", three());
+  const RunFolder run(series.begin(0));
+  run.seal();
+  fs::remove(path / "series.json");
+  fs::create_directory(path / "series.json");
+  CHECK_THROWS(series.end(0, "fault"));
+  CHECK_FALSE(fs::exists(path / "run-0001"));
+}
+
 TEST_CASE("a series is not continued over a run whose files have changed") {
   const TemporaryFolder place;
   const fs::path path = place.path / "series";
   {
     SeriesFolder series(path, "id", "paper", three());
-    const RunFolder run(series.begin(0));
-    run.write("run.csv", std::string_view("x"));
-    run.seal();
-    series.end(0, "completed");
+    do_run(series, 0, "completed");
   }
   CHECK(SeriesFolder(path, "id", "paper", three()).done(0));
   std::ofstream(path / "run-0001" / "run.csv") << "y";

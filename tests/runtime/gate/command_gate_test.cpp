@@ -100,6 +100,20 @@ TEST_CASE("a command exactly at the limits passes and is not counted as limited"
   CHECK(gate.count(GateAction::motor_clamped) == 0);
 }
 
+TEST_CASE("a limit between two steps of the PWM lets the lower one through, and only more than the limit is counted") {
+  const auto check = [](double wanted) {
+    CommandGate gate({.motor_duty_max = 0.5, .brake_duty_max = 0.5}, any_phase(), {}, 0.0,
+                     {.motor = 0.4, .brake = 0.3});
+    const GateResult motor = gate.check({.motor_duty = wanted, .motor_enable = true}, moderate);
+    const GateResult brake = gate.check({.brake_duty = wanted}, {.now_ns = ms});
+    CHECK(motor.command.motor_duty == 0.4);
+    CHECK(brake.command.brake_duty == 0.3);
+    return std::pair(motor.action, brake.action);
+  };
+  CHECK(check(0.5) == std::pair(GateAction::passed, GateAction::passed));
+  CHECK(check(0.51) == std::pair(GateAction::motor_clamped, GateAction::brake_clamped));
+}
+
 TEST_CASE("a torque below 0 becomes 0") {
   CommandGate gate(GateOptions{});
   CHECK(gate.check({.brake_torque_Nm = -1.0}, moderate).command.brake_torque_Nm == 0.0);
