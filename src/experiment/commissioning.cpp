@@ -25,6 +25,8 @@ constexpr double least_turn = 0.125;
 constexpr double turn_tolerance = 0.03;
 /// A wheel counts as standing if it moves less than `still_counts` in this time.
 constexpr std::int64_t standstill_ns = 500'000'000;
+/// Between two readings while a wheel is turned by hand: counters of 16 bits must not pass their half meanwhile.
+constexpr std::int64_t watch_ns = 50 * rig::ns_per_ms;
 
 void require(bool in_range, const char* what, double value, const char* range) {
   if (!in_range) throw std::invalid_argument(formatted("%s = %g: give a number in %s", what, value, range));
@@ -43,6 +45,11 @@ class SafeAtEnd {
 };
 
 }  // namespace
+
+std::string words(const driver::IoResult& result) {
+  const std::string error = driver::error_text(result);
+  return result.reason == rig::Reason::none ? error : std::string(rig::description(result.reason)) + ": " + error;
+}
 
 Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, Dialog& dialog, PulseGuard& guard,
                              const CommissioningOptions& options, std::function<bool()> stop_requested)
@@ -76,7 +83,7 @@ CommissioningResult Commissioning::run() {
   }
   const driver::IoResult result = driver_.deactivate();
   if (!result.ok()) {
-    dialog_.tell("the safe state may not have reached the board: " + driver::error_text(result));
+    dialog_.tell("the safe state may not have reached the board: " + words(result));
     return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
@@ -85,7 +92,7 @@ CommissioningResult Commissioning::run() {
 bool Commissioning::read(rig::Measurement& measurement) {
   const driver::IoResult result = driver_.read(clock_.now_ns(), measurement);
   if (!result.ok()) {
-    dialog_.tell("FAILED: cannot read the board: " + driver::error_text(result));
+    dialog_.tell("FAILED: cannot read the board: " + words(result));
   } else if (measurement.trip_flags != 0) {
     dialog_.tell(formatted("FAILED: the board's interlocks have tripped, flags 0x%x (bit 0x2: supply voltage)",
                            measurement.trip_flags));
@@ -93,11 +100,24 @@ bool Commissioning::read(rig::Measurement& measurement) {
   return result.ok() && measurement.trip_flags == 0;
 }
 
+bool Commissioning::read_fresh(rig::Measurement& measurement) {
+  constexpr int tries = 20;
+  const std::int64_t from_ns = clock_.now_ns();
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    if (!read(measurement)) return false;
+    if (measurement.time_ns >= from_ns) return true;
+    clock_.sleep_until(clock_.now_ns() + cycle_ns);
+  }
+  dialog_.tell(formatted("FAILED: the board did not answer %d times in a row: check its cable and its link", tries));
+  return false;
+}
+
 CommissioningResult Commissioning::read_board() {
-  if (!dialog_.ask(step(1) + "the program opens the board and reads its registers. It writes nothing; nothing can "
-                             "move. Go on?")) {
+  if (!agrees(step(1) + "the program opens the board and reads its registers. It writes nothing; nothing can "
+                        "move. Go on?")) {
     return CommissioningResult::declined;
   }
+  guard_.take_board();
   driver_.configure();
   for (const std::string& line : driver_.notes()) dialog_.tell("  " + line);
   for (const std::string& line : driver_.inspection()) dialog_.tell("  " + line);
@@ -158,28 +178,30 @@ bool Commissioning::activate_and_rest() {
     throw;
   }
   guard_.end(rests.ok());
-  if (!rests.ok()) dialog_.tell("FAILED: the board's outputs are not off: " + driver::error_text(rests));
+  if (!rests.ok()) dialog_.tell("FAILED: the board's outputs are not off: " + words(rests));
   return rests.ok();
 }
 
 CommissioningResult Commissioning::turn_by_hand() {
-  if (!dialog_.ask(step(2) +
-                   "the program sets both PWMs and the counters to 0; then you turn the wheels by hand. Press the "
-                   "E-stop and lift the upper wheel off the lower one. Go on?")) {
+  if (!agrees(step(2) + "the program sets both PWMs and the counters to 0; then you turn the wheels by hand. Press the "
+                        "E-stop and lift the upper wheel off the lower one. Go on?")) {
     return CommissioningResult::declined;
   }
   if (!activate_and_rest()) return CommissioningResult::failed;
   for (const Wheel wheel : {Wheel::upper, Wheel::lower}) {
     rig::Measurement before;
     rig::Measurement after;
-    if (!read(before)) return CommissioningResult::failed;
+    if (!read_fresh(before)) return CommissioningResult::failed;
     const std::string name = wheel == Wheel::upper ? "UPPER" : "LOWER";
+    bool readable = true;
     if (!dialog_.wait_until_done("Turn the " + name +
-                                 " wheel exactly one turn in the driving direction: mark its rim and "
-                                 "bring the mark back to where it was, then press Enter")) {
-      return CommissioningResult::declined;
+                                     " wheel exactly one turn in the driving direction: mark its rim and "
+                                     "bring the mark back to where it was, then press Enter",
+                                 [&] { return readable = read(after); })) {
+      return readable ? CommissioningResult::declined : CommissioningResult::failed;
     }
-    if (!read(after)) return CommissioningResult::failed;
+    clock_.sleep_until(clock_.now_ns() + watch_ns);  // an emulated wheel jumps: the driver doubts a jump in less time
+    if (!read_fresh(after)) return CommissioningResult::failed;
     const Travel travel{.upper = rig::counts_between(before.upper_counts, after.upper_counts),
                         .lower = rig::counts_between(before.lower_counts, after.lower_counts)};
     if (!judge_turn(wheel, travel)) return CommissioningResult::failed;
@@ -198,7 +220,7 @@ bool Commissioning::drive(const rig::Command& command, std::int64_t end_ns) {
     if (!read(now)) return false;
     if (clock_.now_ns() >= end_ns) break;
     if (const driver::IoResult result = driver_.write(command); !result.ok()) {
-      dialog_.tell("FAILED: cannot write to the board: " + driver::error_text(result));
+      dialog_.tell("FAILED: cannot write to the board: " + words(result));
       return false;
     }
   }
@@ -209,17 +231,17 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   rig::Measurement first;
   rig::Measurement now;
   guard_.begin();
-  bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
+  bool good = read_fresh(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
   // A driver that failed has already made its outputs safe; it reports the result again.
   const bool active = driver_.state() == driver::DriverState::active;
   driver::IoResult ended = active ? driver_.write(rig::safe_command) : driver_.deactivate();
   if (active && ended.ok()) ended = driver_.rest();
   guard_.end(ended.ok());
   if (good && !ended.ok()) {
-    dialog_.tell("FAILED: cannot end the pulse: " + driver::error_text(ended));
+    dialog_.tell("FAILED: cannot end the pulse: " + words(ended));
     good = false;
   }
-  if (!good || !read(now)) return false;
+  if (!good || !read_fresh(now)) return false;
   travel = {.upper = rig::counts_between(first.upper_counts, now.upper_counts),
             .lower = rig::counts_between(first.lower_counts, now.lower_counts)};
   return true;
@@ -227,7 +249,7 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
 
 bool Commissioning::wait_for_standstill() {
   rig::Measurement last;
-  if (!read(last)) return false;
+  if (!read_fresh(last)) return false;
   const std::int64_t limit_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
   std::int64_t still_since_ns = clock_.now_ns();
   while (clock_.now_ns() - still_since_ns < standstill_ns) {
@@ -238,7 +260,7 @@ bool Commissioning::wait_for_standstill() {
     }
     clock_.sleep_until(clock_.now_ns() + cycle_ns);
     rig::Measurement now;
-    if (!read(now)) return false;
+    if (!read_fresh(now)) return false;
     if (now.upper_counts != last.upper_counts || now.lower_counts != last.lower_counts) {
       still_since_ns = clock_.now_ns();
     }
@@ -248,10 +270,9 @@ bool Commissioning::wait_for_standstill() {
 }
 
 CommissioningResult Commissioning::drive_pulse() {
-  if (!dialog_.ask(step(3) +
-                   formatted("the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
-                             "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
-                             options_.drive_duty, options_.drive_pulse_s))) {
+  if (!agrees(step(3) + formatted("the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
+                                  "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
+                                  options_.drive_duty, options_.drive_pulse_s))) {
     return CommissioningResult::declined;
   }
   Travel travel;
@@ -272,7 +293,7 @@ CommissioningResult Commissioning::drive_pulse() {
 }
 
 CommissioningResult Commissioning::brake_pulse() {
-  if (!dialog_.ask(
+  if (!agrees(
           step(driver_.watched_cable().empty() ? 4 : 5) +
           formatted("the upper wheel stands and its brake gets duty %.2f for %.2f s, then once more while "
                     "the program sends nothing for %.2f s, to see whether the board holds its outputs. Keep your hands "
@@ -293,14 +314,19 @@ CommissioningResult Commissioning::brake_pulse() {
   if (!measure_outputs()) return CommissioningResult::failed;
   if (stop_requested_()) return CommissioningResult::interrupted;
   dialog_.tell("ok: " + output_text());
-  if (!dialog_.ask(options_.emulated
-                       ? "Did the emulated brake grip and release? Nobody can see or hear it: look at the column "
-                         "brake_torque_Nm of the emulator's --truth file."
-                       : "Did you see or hear the brake grip and release?")) {
-    dialog_.tell("FAILED: check the brake's supply and cable, and the dead zone (plant.u0)");
-    return CommissioningResult::failed;
-  }
-  return CommissioningResult::passed;
+  return is_seen(options_.emulated
+                     ? "Did the emulated brake grip and release? Nobody can see or hear it: look at the column "
+                       "brake_torque_Nm of the emulator's --truth file."
+                     : "Did you see or hear the brake grip and release?",
+                 "check the brake's supply and cable, and the dead zone (plant.u0)");
+}
+
+CommissioningResult Commissioning::is_seen(const std::string& question, const char* fix) {
+  const Answer answer = dialog_.ask(question);
+  if (answer == Answer::no) dialog_.tell(std::string("FAILED: ") + fix);
+  return answer == Answer::yes  ? CommissioningResult::passed
+         : answer == Answer::no ? CommissioningResult::failed
+                                : CommissioningResult::declined;
 }
 
 void Commissioning::watch_silence() {
@@ -330,7 +356,7 @@ bool Commissioning::measure_outputs() {
   const driver::IoResult ended = driver_.deactivate();
   output_times_.release_ms = static_cast<double>(clock_.now_ns() - ordered_ns) / rig::ns_per_ms;
   guard_.end(ended.ok());
-  if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + driver::error_text(ended));
+  if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + words(ended));
   return driven && ended.ok();
 }
 

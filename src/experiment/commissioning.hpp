@@ -10,6 +10,8 @@
 
 namespace abs_hil::experiment {
 
+enum class Answer : std::uint8_t { yes, no, none };  ///< none: the input has ended, or a signal came
+
 /// The dialog with the person at the rig.
 class Dialog {
  public:
@@ -19,10 +21,11 @@ class Dialog {
   virtual ~Dialog() = default;
 
   virtual void tell(const std::string& text) = 0;
-  /// Asks a yes-or-no question. Everything but a plain yes counts as no, also the end of input.
-  [[nodiscard]] virtual bool ask(const std::string& question) = 0;
-  /// Waits until the person has done what the text says. Returns false at the end of input.
-  [[nodiscard]] virtual bool wait_until_done(const std::string& text) = 0;
+  /// Asks a yes-or-no question. Every line but a plain yes counts as no.
+  [[nodiscard]] virtual Answer ask(const std::string& question) = 0;
+  /// Waits until the person has done what the text says, and meanwhile calls `watch` every 50 ms. Returns false if
+  /// `watch` does, at the end of input and at a signal.
+  [[nodiscard]] virtual bool wait_until_done(const std::string& text, const std::function<bool()>& watch) = 0;
 };
 
 /// A guard that makes the outputs safe if this program dies or hangs during a pulse.
@@ -33,6 +36,8 @@ class PulseGuard {
   PulseGuard& operator=(const PulseGuard&) = delete;
   virtual ~PulseGuard() = default;
 
+  /// Called before the driver opens the board. Throws driver::Unavailable: then it stays closed.
+  virtual void take_board() {}
   /// Called before the pulse. Throws driver::Unavailable: then there is no pulse.
   virtual void begin() = 0;
   /// Called in each cycle of the pulse before the write: a heartbeat. Returns false once the guard has ended.
@@ -55,6 +60,9 @@ struct CommissioningOptions {
 };
 
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
+
+/// An error as a run names it: the backend's own reason, if it has one, and the error.
+[[nodiscard]] std::string words(const driver::IoResult& result);
 
 /// The first steps with a rig. Each needs the person's consent: read the board, turn the wheels by hand, a small drive
 /// pulse, the cable pulled if the board watches it, a small brake pulse. A guard stands by whenever an output is on.
@@ -91,7 +99,13 @@ class Commissioning {
   [[nodiscard]] CommissioningResult pull_cable();
   [[nodiscard]] CommissioningResult brake_pulse();
   [[nodiscard]] bool judge_turn(Wheel wheel, const Travel& travel);
+  /// Asks for consent to a step.
+  [[nodiscard]] bool agrees(const std::string& question) { return dialog_.ask(question) == Answer::yes; }
+  /// Asks what only a person can see; tells the fix if it was not seen.
+  [[nodiscard]] CommissioningResult is_seen(const std::string& question, const char* fix);
   [[nodiscard]] bool read(rig::Measurement& measurement);
+  /// The same for a decision: not a measurement from before this call, which a driver repeats when an answer is lost.
+  [[nodiscard]] bool read_fresh(rig::Measurement& measurement);
   [[nodiscard]] bool pulse(const rig::Command& command, double duration_s, Travel& travel);
   [[nodiscard]] bool drive(const rig::Command& command, std::int64_t end_ns);
   /// Drives until the board is silent; `before` are then the speeds of the wheels, counts/s.

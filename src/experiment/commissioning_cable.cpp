@@ -28,7 +28,7 @@ bool Commissioning::drive_until_silent(Travel& before) {
     if (const driver::IoResult io =
             result.ok() ? driver_.write({.motor_duty = options_.drive_duty, .motor_enable = true}) : result;
         !io.ok()) {
-      dialog_.tell("FAILED: " + driver::error_text(io));
+      dialog_.tell("FAILED: " + words(io));
       return false;
     }
     if (now.time_ns - mark.time_ns < window_ns) continue;
@@ -36,7 +36,7 @@ bool Commissioning::drive_until_silent(Travel& before) {
               .lower = rig::counts_between(mark.lower_counts, now.lower_counts)};
     mark = now;
   }
-  dialog_.tell("FAILED: the cable was not pulled, or the board works without it");
+  if (!stop_requested_()) dialog_.tell("FAILED: the cable was not pulled, or the board works without it");
   return false;
 }
 
@@ -48,16 +48,16 @@ bool Commissioning::await_board() {
     if (!guard_.beat()) return false;
     if (driver_.read(clock_.now_ns(), ignored).error != driver::IoError::no_answer) return true;
   }
-  dialog_.tell("FAILED: the board does not answer again");
+  if (!stop_requested_()) dialog_.tell("FAILED: the board does not answer again");
   return false;
 }
 
 bool Commissioning::counts_in_0_1_s(Travel& travel) {
   rig::Measurement first;
   rig::Measurement last;
-  if (!read(first)) return false;
+  if (!read_fresh(first)) return false;
   clock_.sleep_until(clock_.now_ns() + rig::ns_per_s / 10);
-  if (!read(last)) return false;
+  if (!read_fresh(last)) return false;
   travel = {.upper = rig::counts_between(first.upper_counts, last.upper_counts),
             .lower = rig::counts_between(first.lower_counts, last.lower_counts)};
   return true;
@@ -66,11 +66,11 @@ bool Commissioning::counts_in_0_1_s(Travel& travel) {
 CommissioningResult Commissioning::pull_cable() {
   const std::string cable(driver_.watched_cable());
   if (cable.empty()) return CommissioningResult::passed;
-  if (!dialog_.ask(step(4) +
-                   formatted("the drive gets duty %.2f until you pull the %s. The wheels must then coast. If they go "
-                             "faster, press the E-stop at once: the outputs have the wrong polarity. Close the cover, "
-                             "stand clear, one hand at the cable and one at the E-stop. Go on?",
-                             options_.drive_duty, cable.c_str()))) {
+  if (!agrees(step(4) +
+              formatted("the drive gets duty %.2f until you pull the %s. The wheels must then coast. If they go "
+                        "faster, press the E-stop at once: the outputs have the wrong polarity. Close the cover, "
+                        "stand clear, one hand at the cable and one at the E-stop. Go on?",
+                        options_.drive_duty, cable.c_str()))) {
     return CommissioningResult::declined;
   }
   guard_.begin();
@@ -91,9 +91,10 @@ CommissioningResult Commissioning::pull_cable() {
                   before.lower, after.lower));
     return CommissioningResult::failed;
   }
-  if (!dialog_.ask("Did the wheels coast while the cable was out?")) {
-    dialog_.tell("FAILED: wire the outputs active-low (docs/hm2.md, \"Wiring\")");
-    return CommissioningResult::failed;
+  if (const CommissioningResult coasted = is_seen("Did the wheels coast while the cable was out?",
+                                                  "wire the outputs active-low (docs/hm2.md, \"Wiring\")");
+      coasted != CommissioningResult::passed) {
+    return coasted;
   }
   dialog_.tell(
       formatted("ok: the lower wheel made %d counts in 0.1 s before the cable was pulled and %d after it was "

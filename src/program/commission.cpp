@@ -1,13 +1,18 @@
 // `abs_hil commission`: the first steps with a rig, as questions in the terminal.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
-#include <iostream>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "config/config_file.hpp"
 #include "driver/factory.hpp"
@@ -29,36 +34,67 @@ class Terminal final : public experiment::Dialog {
     fmt::print("{}\n", text);
     std::fflush(stdout);
   }
-  bool ask(const std::string& question) override {
+  experiment::Answer ask(const std::string& question) override {
     tell("\n" + question + " [y/N]");
-    std::string answer;
-    return std::getline(std::cin, answer) && (answer == "y" || answer == "Y" || answer == "yes");
+    const auto answer = line([] { return true; });
+    if (!answer) return experiment::Answer::none;
+    return *answer == "y" || *answer == "Y" || *answer == "yes" ? experiment::Answer::yes : experiment::Answer::no;
   }
-  bool wait_until_done(const std::string& text) override {
+  bool wait_until_done(const std::string& text, const std::function<bool()>& watch) override {
     tell(text);
-    std::string line;
-    return static_cast<bool>(std::getline(std::cin, line));
+    return line(watch).has_value();
   }
+
+ private:
+  /// The next line of stdin; nothing at its end, at a signal and if `watch` returns false.
+  std::optional<std::string> line(const std::function<bool()>& watch) {
+    constexpr int watch_ms = 50;
+    std::array<char, 256> bytes{};
+    for (;;) {
+      if (const std::size_t end = typed_.find('\n'); end != std::string::npos) {
+        std::string first = typed_.substr(0, end);
+        typed_.erase(0, end + 1);
+        return first;
+      }
+      pollfd readable{STDIN_FILENO, POLLIN, 0};
+      const int ready = ::poll(&readable, 1, watch_ms);
+      if (signalled() != rig::Reason::none || (ready == 0 && !watch())) return std::nullopt;
+      if (ready <= 0) continue;
+      const ssize_t got = ::read(STDIN_FILENO, bytes.data(), bytes.size());
+      if (got <= 0) return typed_.empty() ? std::nullopt : std::optional(std::exchange(typed_, {}));
+      typed_.append(bytes.data(), static_cast<std::size_t>(got));
+    }
+  }
+
+  std::string typed_{};  ///< and not taken yet
 };
 
 /// A guardian for each pulse. Between pulses the outputs are 0 and the program waits for a person, without heartbeats.
 class GuardedPulse final : public experiment::PulseGuard {
  public:
-  /// @param lease  null: a guardian of its own for each pulse
-  GuardedPulse(const config::Configuration& configuration, driver::RigDriver& driver, guardian::GuardianLease* lease)
+  /// @param lease  stays null where each pulse has a guardian of its own; ends after the driver has let go of the board
+  GuardedPulse(const config::Configuration& configuration, driver::RigDriver& driver,
+               std::unique_ptr<guardian::GuardianLease>& lease)
       : configuration_(configuration), driver_(driver), lease_(lease) {}
   ~GuardedPulse() override {
     driver_.tell_before_making_safe(nullptr);
     if (guardian_ != nullptr) static_cast<void>(guardian_->end());  // it uses this object's memory
   }
 
+  /// The resident service ends a holder that is not covered in time, and a person takes longer than that.
+  void take_board() override {
+    lease_ = guardian::ask_for_lease(configuration_.settings, false);
+    if (lease_ == nullptr) return;
+    begin();
+    end(true);
+  }
   void begin() override {
     if (!guardian::needs_guardian(configuration_.settings, false)) return;
     recorder_.emplace(1);
     const std::string launch_config = guardian_launch_json(configuration_, {});
     if (lease_ != nullptr) {
       lease_->cover(*recorder_, launch_config);
-      guardian_ = lease_;
+      guardian_ = lease_.get();
     } else {
       own_guardian_.emplace(*recorder_, guardian::guardian_program(), launch_config);
       guardian_ = &*own_guardian_;
@@ -85,7 +121,7 @@ class GuardedPulse final : public experiment::PulseGuard {
  private:
   const config::Configuration& configuration_;
   driver::RigDriver& driver_;
-  guardian::GuardianLease* lease_;
+  std::unique_ptr<guardian::GuardianLease>& lease_;
   // The guardian must be destroyed before the recorder that it uses.
   std::optional<guardian::SharedRecorder> recorder_{};
   std::optional<guardian::Heartbeat> watch_{};
@@ -109,15 +145,15 @@ void keep_record(const config::Settings& settings, const driver::BoardIdentity& 
   terminal.tell("commissioning record: " + file.string());
 }
 
-int commission(const config::Configuration& configuration, const experiment::CommissioningOptions& options) {
+experiment::CommissioningResult go_through(const config::Configuration& configuration,
+                                           const experiment::CommissioningOptions& options, Terminal& terminal) {
   const driver::DriverOptions& driver_options = configuration.settings.driver;
-  const auto lease = guardian::ask_for_lease(configuration.settings, false);
+  std::unique_ptr<guardian::GuardianLease> lease;
   const auto driver = driver::make_rig_driver(driver_options);
   runtime::MonotonicClock clock;
-  Terminal terminal;
-  note_signals();
   terminal.tell(
       "Commissioning in steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
+      "Any answer but y makes it write zeros and end.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
   terminal.tell(config::model_origin(configuration.settings,
                                      std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
@@ -125,27 +161,59 @@ int commission(const config::Configuration& configuration, const experiment::Com
       "identity {}: the limits of gate and checks come from it, and the record will hold it; --set rig.identity=FILE "
       "names the file of your rig (docs/safety.md)",
       configuration.settings.rig.source));
-  GuardedPulse guard(configuration, *driver, lease.get());
+  GuardedPulse guard(configuration, *driver, lease);
   experiment::CommissioningOptions pulses = options;
   pulses.emulated = !runtime::is_real_board(driver_options);
   pulses.encoder_counts_per_rev = driver_options.encoder_counts_per_rev;
   experiment::Commissioning commissioning(*driver, clock, terminal, guard, pulses,
                                           [] { return signalled() != rig::Reason::none; });
-  switch (commissioning.run()) {
-    case experiment::CommissioningResult::passed:
-      keep_record(configuration.settings, driver->identity(), commissioning, terminal);
-      terminal.tell(driver_options.emulated
-                        ? "All steps passed on an emulator. This does not verify any hardware."
-                        : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
-                          "driver.verified_on_hardware=true in your configuration.");
-      return exit_completed;
-    case experiment::CommissioningResult::declined:
-      terminal.tell("Stopped at your request; the outputs are safe.");
-      return exit_ended_early;
-    case experiment::CommissioningResult::failed: return exit_ended_early;
-    case experiment::CommissioningResult::interrupted: return status_of(signalled());
+  const experiment::CommissioningResult result = commissioning.run();
+  if (result == experiment::CommissioningResult::passed) {
+    keep_record(configuration.settings, driver->identity(), commissioning, terminal);
   }
-  return exit_ended_early;
+  return result;
+}
+
+/// Makes the board safe that nobody has open here, and has perhaps never been opened. The resident service, if there is
+/// one, does so before it grants a lease; no lease, no right to write.
+/// @return why the safe state is not verified; empty if it is
+std::string make_safe(const config::Settings& settings) try {
+  if (guardian::ask_for_lease(settings, false) != nullptr) return {};
+  const auto writer = driver::make_safe_state_writer(settings.driver);
+  constexpr int tries = 20;
+  constexpr int pause_ms = 10;
+  driver::IoResult result{};
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    result = writer->make_safe();
+    if (result.ok()) return {};
+    static_cast<void>(::poll(nullptr, 0, pause_ms));
+  }
+  // Says why the board cannot be opened.
+  if (result.reason == rig::Reason::none) driver::make_safe_state_writer(settings.driver)->prepare();
+  return experiment::words(result);
+} catch (const driver::Unavailable& error) {
+  return error.what();
+}
+
+int commission(const config::Configuration& configuration, const experiment::CommissioningOptions& options) {
+  Terminal terminal;
+  note_signals();
+  const experiment::CommissioningResult result = go_through(configuration, options, terminal);
+  if (result == experiment::CommissioningResult::passed) {
+    terminal.tell(configuration.settings.driver.emulated
+                      ? "All steps passed on an emulator. This does not verify any hardware."
+                      : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
+                        "driver.verified_on_hardware=true in your configuration.");
+    return exit_completed;
+  }
+  const std::string stopped =
+      result == experiment::CommissioningResult::declined ? "Stopped at your request; " : "Stopped; ";
+  const std::string unsafe = make_safe(configuration.settings);
+  terminal.tell(stopped + (unsafe.empty() ? "the outputs are safe: zeros were written and read back."
+                                          : "SAFE STATE NOT VERIFIED: " + unsafe +
+                                                "\nPress the E-stop (it cuts the drive only), then pull the rig's "
+                                                "power plug: the board may hold its last duties"));
+  return result == experiment::CommissioningResult::interrupted ? status_of(signalled()) : exit_ended_early;
 }
 
 struct CommissionOptions {

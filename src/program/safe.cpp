@@ -1,6 +1,7 @@
 // `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else.
 #include <fmt/format.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -94,7 +95,13 @@ Given read_given(const config::Sources& o, const std::optional<std::string>& fil
     given.names_board = false;
     given.problems.emplace_back(error.what());
   }
-  static_cast<void>(settings_of(given, {}, &given.problems));
+  const driver::DriverOptions board = settings_of(given, {}, &given.problems).driver;
+  try {
+    if (given.names_board) static_cast<void>(driver::make_safe_state_writer(board, true));
+  } catch (const std::exception& error) {  // its place is no place: then all that can be found are searched
+    given.names_board = false;
+    given.problems.emplace_back(error.what());
+  }
   return given;
 }
 
@@ -259,7 +266,12 @@ std::string words_about(const Seen& seen, const std::vector<BoardOwner>& owners,
   }
   std::string problem = seen.problem;
   if (problem.empty()) {
-    problem = "the zeros were verified, but another process may overwrite them: run this as root";
+    problem = alone ? fmt::format(
+                          "the zeros were verified, but not {} times in a row: the link to the board loses data, or "
+                          "something else drives it",
+                          enough_quiet_tries)
+                    : "the zeros were verified, but another process may overwrite them";
+    if (::geteuid() != 0) problem += "; run this as root";
   }
   return fmt::format(
       "abs_hil: {}: SAFE STATE NOT VERIFIED: {}{}\nPress the E-stop (it cuts the drive only), then pull the rig's "
@@ -322,10 +334,9 @@ int make_boards_safe(const SafeCommand& command) {
   if (boards.empty()) {
     bad +=
         "abs_hil: safe: no board found (abs_hil doctor --only boards); name it with --set driver.kind=KIND and its "
-        "keys. "
-        "A CAN node cannot be found: name it with --set driver.kind=can --set driver.can.interface=NAME (docs/can.md). "
-        "If "
-        "a wheel turns or the brake holds: press the E-stop (it cuts the drive only), then pull the rig's power plug\n";
+        "keys. A CAN node cannot be found: name it with --set driver.kind=can --set driver.can.interface=NAME "
+        "(docs/can.md). If a wheel turns or the brake holds: press the E-stop (it cuts the drive only), then pull the "
+        "rig's power plug\n";
   }
   const bool printed = print(std::move(good), std::move(bad));
   if (!zeros.end(threads_end_within_ms) || !printed) std::_Exit(status);

@@ -82,19 +82,23 @@ void ZeroWriting::write_zeros(const std::shared_ptr<State>& state, std::size_t b
   std::unique_lock lock(state->mutex);
   const driver::DriverOptions options = state->boards[board].target.options;
   std::unique_ptr<driver::SafeStateWriter> writer;
+  bool opened = false;
   while (!state->ending) {
     lock.unlock();
     const std::int64_t begin_ns = driver::monotonic_ns();
     driver::IoResult result{driver::IoError::disconnected};
     std::string problem;
     try {
-      if (!writer) {
-        auto made = driver::make_safe_state_writer(options, true);
-        made->prepare();
-        writer = std::move(made);
-      }
+      if (!writer) writer = driver::make_safe_state_writer(options, true);
+      // Zeros first: a board that cannot be identified, or hardly, takes them all the same.
       result = writer->make_safe();
       if (!result.ok()) problem = driver::error_text(result);
+      if (!opened && !has_reached(result)) {
+        auto again = driver::make_safe_state_writer(options, true);
+        again->prepare();  // says why it cannot be opened
+        writer = std::move(again);
+      }
+      opened = true;
     } catch (const std::exception& error) {
       problem = error.what();
     }
@@ -103,8 +107,11 @@ void ZeroWriting::write_zeros(const std::shared_ptr<State>& state, std::size_t b
     lock.lock();
     Seen& seen = state->boards[board];
     seen.reached = has_reached(result);
-    if (seen.reached && seen.zero_ns == 0) seen.zero_ns = driver::monotonic_ns();
-    if (seen.tries++ == 0) seen.before = found;
+    if (seen.reached && seen.zero_ns == 0) {
+      seen.zero_ns = driver::monotonic_ns();
+      seen.before = found;
+    }
+    ++seen.tries;
     if (on) seen.on_ns = driver::monotonic_ns();
     seen.quiet_tries = result.ok() && !on && begin_ns >= state->counts_from_ns ? seen.quiet_tries + 1 : 0;
     seen.problem = std::move(problem);

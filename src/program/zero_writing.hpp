@@ -30,7 +30,7 @@ struct Seen {
   std::int64_t zero_ns{0};                     ///< end of the first try that got its zeros to the board
   bool reached{false};                         ///< the last try did
   std::string problem{"it has not answered"};  ///< of the last try; empty if it verified the zeros
-  std::optional<rig::Command> before{};        ///< the outputs that the first try found
+  std::optional<rig::Command> before{};        ///< the outputs that this try found
   std::int64_t on_ns{0};                       ///< when a try last found an output on
   int quiet_tries{0};  ///< tries since `count_anew` that verified the zeros and found nothing on, unbroken
 };

@@ -255,7 +255,13 @@ class Leases(ResidentTest):
                 f'guardian.socket={service.socket}', 'guardian.timeout_ms=1000')],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
         self._programs.append(program)
-        said = self.go_through_commissioning(program, emulator)
+
+        def answer(question):
+            if 'Step 2' in question:
+                time.sleep(10.5)  # a holder that has no run covered within 10 s is ended
+            return 'y'
+
+        said = self.go_through_commissioning(program, emulator, answer)
         _, errors = program.communicate(timeout=20)
         self.assertEqual(program.returncode, 0, said + errors)
         wait_until(lambda: 'lease ended' in service.said(), 'the lease did not end')

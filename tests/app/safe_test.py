@@ -96,6 +96,49 @@ class Safe(RigTest):
         self.assertIn('driver.kind=can', gone.stderr)
         self.assertIn("pull the rig's power plug", gone.stderr)
 
+    def test_commission_ends_in_the_safe_state_or_says_that_it_did_not(self):
+        for before, typed, command, words in (('', '', '', 'the outputs are safe'), ('y\n', 'n\n', '', 'the outputs are safe'),
+                                              ('', 'n\n', 'unplug', 'SAFE STATE NOT VERIFIED'),
+                                              ('', '', 'all-ones on', 'SAFE STATE NOT VERIFIED')):
+            with self.subTest(typed=before + typed, command=command):
+                emulator = self.emulator()
+                foreign_duties(emulator, 4095, 0)
+                if command:
+                    emulator.command(command)
+                result = subprocess.run(
+                    [PROGRAM, 'commission', '--set', f'driver.pci.root={emulator.root}', '--set',
+                     'driver.emulated=true'], input=before + typed, capture_output=True, text=True, timeout=20)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(f'Stopped at your request; {words}', result.stdout)
+                self.assertEqual('Press the E-stop (' in result.stdout, bool(command))
+                if not command:
+                    self.assertEqual(emulator.wire(), SAFE)
+                emulator.end()
+
+    def test_a_board_that_cannot_be_identified_gets_zeros_all_the_same(self):
+        """It never answers: nobody can tell where its registers are, and zeros go to the usual place at once."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+            board.bind(('127.0.0.1', 0))
+            result = self.run_program('safe', *settings('driver.kind=hm2', 'driver.hm2.address=%s:%d' % board.getsockname()),
+                                      '--insist', '0.1')
+            self.assertEqual(result.returncode, 1)
+            self.assertIn('SAFE STATE NOT VERIFIED: board did not answer in time', result.stderr)
+            board.setblocking(False)
+            bite = bytes.fromhex('81c2000c01000000')
+            self.assertIn(bite, board.recv(1024), 'the first datagram')
+            received = []
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    received.append(board.recv(1024))
+            self.assertGreater(sum(bite in datagram for datagram in received), 10)
+
+    def test_a_card_that_is_not_on_the_bus_has_no_values(self):
+        emulator = self.emulator('--command', 'all-ones on')
+        result = self.safe(emulator, '--insist', '0.2')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('SAFE STATE NOT VERIFIED: board is gone', result.stderr)
+        self.assertNotIn('before:', result.stderr)
+
     def test_says_what_was_on(self):
         emulator = self.emulator()
         foreign_duties(emulator, 4095, 2048)
@@ -110,6 +153,7 @@ class Safe(RigTest):
         for words, *args in (('driver.pci.brake_duty_max', '--set', 'driver.pci.brake_duty_max=7'),
                              ('nearest known key', '--set', 'drver.kind=pci'),
                              ('driver.kind', '--set', 'driver.kind=pcie'),
+                             ('driver.hm2.address', '--set', 'driver.kind=hm2', '--set', 'driver.hm2.address=localhost:27191'),
                              ('no such file', '--config', self.folder / 'missing.toml'),
                              ('not valid TOML', '--config', not_toml),
                              ('unknown option --nonsense', '--nonsense'),

@@ -55,3 +55,15 @@ TEST_CASE("A cable that nobody pulls ends the commissioning, the drive off") {
   CHECK_THAT(lab.person.said, Contains("the cable was not pulled"));
   CHECK(lab.board.state() == driver::DriverState::inactive);
 }
+
+TEST_CASE("Who leaves while the cable is to be pulled, or at the question about it, has not failed the rig") {
+  CableLab leaving(90);
+  leaving.person.leaves_at = 5;
+  CHECK(leaving.run() == CommissioningResult::declined);
+  CHECK_THAT(leaving.person.said, !Contains("FAILED"));
+  OtherLab stopping;
+  stopping.board.cable = "Ethernet cable";
+  stopping.person.before_answer = [&] { stopping.stop = stopping.person.asked.size() == 4; };
+  CHECK(stopping.run() == CommissioningResult::interrupted);
+  CHECK_THAT(stopping.person.said, !Contains("FAILED"));
+}

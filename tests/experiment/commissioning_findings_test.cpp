@@ -102,6 +102,52 @@ TEST_CASE("An encoder of another scale is found by one turn by hand, within 3 %,
   CHECK(coarse.run() == CommissioningResult::passed);
 }
 
+TEST_CASE("Counters of 16 bits are followed while a wheel is turned by hand") {
+  const auto [one_turn, in_model, passes] = GENERATE(std::tuple(40000, 40000, true), std::tuple(69632, 4096, false));
+  OtherLab lab;
+  std::int32_t raw = 0;  // of the upper wheel; the driver sees its low 16 bits
+  lab.options.encoder_counts_per_rev = in_model;
+  lab.person.parts = 20;
+  lab.person.turn = [&, one_turn = one_turn](bool upper) {
+    (upper ? raw : lab.board.counters.lower_counts) += one_turn / 20;
+  };
+  lab.person.enter = [&, one_turn = one_turn](bool upper) {
+    (upper ? raw : lab.board.counters.lower_counts) += one_turn % 20;
+  };
+  lab.board.on_read = [&]() -> driver::IoResult {
+    lab.board.counters.upper_counts += static_cast<std::int16_t>(raw - lab.board.counters.upper_counts);
+    return {};
+  };
+  CHECK((lab.run() == CommissioningResult::passed) == passes);
+  INFO(lab.person.said);
+  if (!passes) CHECK_THAT(lab.person.said, Contains("69632 counts are 17.000 turns"));
+}
+
+TEST_CASE("A turn is judged by an answer from after it, not by one that a driver repeats") {
+  OtherLab lab;
+  lab.person.turn = [](bool) {};
+  int lost = 0;
+  SECTION("three answers lost") { lost = 3; }
+  SECTION("no answer any more") { lost = 1000; }
+  lab.person.enter = [&](bool upper) {
+    (upper ? lab.board.counters.upper_counts : lab.board.counters.lower_counts) += 4096;
+    lab.board.lost_answers = lost;
+  };
+  CHECK((lab.run() == CommissioningResult::passed) == (lost == 3));
+  CHECK_THAT(lab.person.said, !Contains("too few"));
+  if (lost > 3) CHECK_THAT(lab.person.said, Contains("FAILED: the board did not answer 20 times in a row"));
+}
+
+TEST_CASE("An error is named by the backend's reason, as in a run") {
+  OtherLab lab;
+  lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
+    if (command.motor_duty == 0.0) return {};
+    return {driver::IoError::read_back_mismatch, 0xd00, 0, rig::Reason::hm2_watchdog_bit};
+  };
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains(std::string(rig::description(rig::Reason::hm2_watchdog_bit)) + ": register"));
+}
+
 TEST_CASE("A board that fails in a pulse ends it with a message about the failed step") {
   OtherLab lab;
   std::string words;

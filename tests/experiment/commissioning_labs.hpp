@@ -44,6 +44,7 @@ class OtherBoard final : public driver::RigDriver {
   explicit OtherBoard(std::string_view kind) : kind_(kind) {}
   [[nodiscard]] std::string_view name() const noexcept override { return kind_; }
   rig::Measurement counters{};
+  int lost_answers{0};  ///< so many readings repeat the one before
   std::function<driver::IoResult()> on_read{[] { return driver::IoResult{}; }};
   std::function<driver::IoResult(const rig::Command&)> on_write{[](const rig::Command&) { return driver::IoResult{}; }};
   driver::IoResult made_safe{};
@@ -58,8 +59,12 @@ class OtherBoard final : public driver::RigDriver {
   void do_activate(std::int64_t /*now_ns*/) override {}
   driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
     const driver::IoResult result = on_read();
-    measurement = counters;
-    measurement.time_ns = now_ns;
+    if (lost_answers > 0 && lost_answers-- > 0) {
+      measurement = last_;
+      return result;
+    }
+    measurement = last_ = counters;
+    measurement.time_ns = last_.time_ns = now_ns;
     return result;
   }
   driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
@@ -73,6 +78,7 @@ class OtherBoard final : public driver::RigDriver {
   }
 
   std::string_view kind_;
+  rig::Measurement last_{};
 };
 
 /// A rig on such a board that does what it should: each test lets one thing go wrong.

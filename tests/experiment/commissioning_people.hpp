@@ -14,22 +14,31 @@ namespace abs_hil::experiment::test {
 class Person final : public Dialog {
  public:
   void tell(const std::string& text) override { said += text + '\n'; }
-  bool ask(const std::string& question) override {
+  Answer ask(const std::string& question) override {
     asked.push_back(question);
     before_answer();
-    return static_cast<int>(asked.size()) != no_to;
+    if (static_cast<int>(asked.size()) == leaves_at) return Answer::none;
+    return static_cast<int>(asked.size()) == no_to ? Answer::no : Answer::yes;
   }
-  bool wait_until_done(const std::string& text) override {
+  bool wait_until_done(const std::string& text, const std::function<bool()>& watch) override {
     take_time();
-    turn(text.find("UPPER") != std::string::npos);
+    const bool upper = text.find("UPPER") != std::string::npos;
+    for (int part = 0; part < parts; ++part) {
+      turn(upper);
+      if (!watch()) return false;
+    }
+    enter(upper);
     return !gives_up;
   }
 
   std::string said{};
   std::vector<std::string> asked{};
   int no_to{0};
+  int leaves_at{0};  ///< the input ends at that question
+  int parts{1};      ///< in which a wheel is turned; the board is watched after each
   bool gives_up{false};
   std::function<void(bool upper)> turn{[](bool) {}};
+  std::function<void(bool upper)> enter{[](bool) {}};
   std::function<void()> take_time{[] {}};
   std::function<void()> before_answer{[] {}};
 };
@@ -38,6 +47,7 @@ class Person final : public Dialog {
 class Guard final : public PulseGuard {
  public:
   explicit Guard(const abs_hil::test::ModelCard& card) : card_(card) {}
+  void take_board() override { ++taken; }
   void begin() override {
     ++begun;
     acting = true;
@@ -49,6 +59,7 @@ class Guard final : public PulseGuard {
     acting = false;
     ended_safe += safe ? 1 : 0;
   }
+  int taken{0};
   int begun{0};
   int beats{0};
   int dies_at{0};

@@ -84,6 +84,7 @@ TEST_CASE("The answer no ends the commissioning: nothing is written before step 
     lab.person.no_to = step;
     CHECK(lab.run() == CommissioningResult::declined);
     CHECK(static_cast<int>(lab.person.asked.size()) == step);
+    CHECK(lab.guard.taken == (step > 1 ? 1 : 0));  // a service's lease, before the board is opened
     const bool wrote =
         std::any_of(lab.card.traffic.begin(), lab.card.traffic.end(), [](auto& a) { return a.is_write; });
     CHECK(wrote == (step > 2));
@@ -93,19 +94,24 @@ TEST_CASE("The answer no ends the commissioning: nothing is written before step 
 
 TEST_CASE("A tripped interlock and a request to stop end a pulse at once") {
   Lab lab;
+  std::int64_t asked_ns = 0;
   SECTION("trip") {
-    lab.person.before_answer = [&lab] {
+    lab.person.before_answer = [&] {
+      asked_ns = lab.clock.now_ns();
       if (lab.person.asked.size() == 3) lab.card.model.set_supply_V(5.0);
     };
     CHECK(lab.run() == CommissioningResult::failed);
     CHECK_THAT(lab.person.said, Contains("interlocks have tripped"));
   }
   SECTION("stop") {
-    lab.person.before_answer = [&lab] { lab.stop = lab.person.asked.size() == 3; };
+    lab.person.before_answer = [&] {
+      asked_ns = lab.clock.now_ns();
+      lab.stop = lab.person.asked.size() == 3;
+    };
     CHECK(lab.run() == CommissioningResult::interrupted);
   }
   CHECK(lab.card.model.outputs().drive_duty == 0.0);
-  CHECK(lab.clock.now_ns() < 4'100'000'000);
+  CHECK(lab.clock.now_ns() < asked_ns + 100'000'000);
 }
 
 TEST_CASE("Pulses that could run away are refused") {
@@ -132,4 +138,13 @@ TEST_CASE("A stop while turning by hand or while the wheels run out ends the com
   };
   CHECK(stopping.run() == CommissioningResult::interrupted);
   CHECK(stopping.guard.begun == 2);
+}
+
+TEST_CASE("Input that ends at a question ends the commissioning as declined, with no word of a failure") {
+  for (int question = 1; question <= 5; ++question) {
+    Lab lab;
+    lab.person.leaves_at = question;
+    CHECK(lab.run() == CommissioningResult::declined);
+    CHECK_THAT(lab.person.said, !Contains("FAILED"));
+  }
 }

@@ -3,7 +3,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <utility>
 
 #include "driver/monotonic_time.hpp"
 
@@ -12,6 +15,8 @@ namespace abs_hil::driver::hm2 {
 namespace {
 
 constexpr std::int64_t answer_ns = 5'000'000;
+/// After so many looks in a row without an answer the board may come back with another firmware.
+constexpr int silent_looks_most = 3;
 
 /// Bases and strides that all firmware known to us has. A board whose answers are lost must get its zeros too.
 Board usual_board() {
@@ -23,6 +28,27 @@ Board usual_board() {
   board.pwm = {.instances = 2, .base = 0x4000, .register_stride = stride, .instance_stride = 4};
   return board;
 }
+
+/// The link while a board is identified, which takes many datagrams, and 20 ms for each that is lost.
+class Identifying final : public Link {
+ public:
+  /// @param zeros     sent before each datagram; null: they have been seen to act
+  /// @param until_ns  then it waits no longer
+  Identifying(Link& link, const Packet* zeros, std::int64_t until_ns)
+      : link_(link), zeros_(zeros), until_ns_(until_ns) {}
+  int send(std::span<const std::uint8_t> bytes) noexcept override {
+    if (zeros_ != nullptr) static_cast<void>(link_.send(zeros_->bytes()));
+    return link_.send(bytes);
+  }
+  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override {
+    return link_.receive(buffer, std::min(deadline_ns, until_ns_));
+  }
+
+ private:
+  Link& link_;
+  const Packet* zeros_;
+  std::int64_t until_ns_;
+};
 
 }  // namespace
 
@@ -41,8 +67,12 @@ void Hm2SafeState::learn(const Board& board) noexcept {
 
 void Hm2SafeState::prepare() {
   if (!link_) link_ = open_link_();
+  identify(*link_);
+}
+
+void Hm2SafeState::identify(Link& link) {
   known_ = false;
-  learn(read_board(*link_, options_.address, number_));
+  learn(read_board(link, options_.address, number_));
   known_ = true;
 }
 
@@ -50,10 +80,14 @@ bool Hm2SafeState::find_board() noexcept {
   try {
     if (!link_) link_ = open_link_();
     if (!link_) return false;
-    // Zeros first: reading the descriptors takes many datagrams.
     static_cast<void>(link_->send(zeros_.bytes()));
-    if (look(answer_ns).error == IoError::no_answer) return false;
-    prepare();
+    const IoResult seen = look(answer_ns);
+    if (seen.error == IoError::no_answer) return false;
+    // The first call of a caller must not take long, even where answers are lost.
+    constexpr std::int64_t first_ns = 20'000'000;
+    const bool first = !std::exchange(tried_, true);
+    Identifying link(*link_, seen.ok() ? nullptr : &zeros_, first ? monotonic_ns() + first_ns : INT64_MAX);
+    identify(link);
     return true;
   } catch (...) {
     return false;  // the usual addresses serve until the board can be read
@@ -65,8 +99,10 @@ IoResult Hm2SafeState::look(std::int64_t wait_ns) noexcept {
   const std::size_t where = packet.read(space::hostmot2, direction_, ports_);
   std::array<std::uint8_t, 4 * most_ports> answer{};
   if (!ask(*link_, packet, answer, number_, wait_ns, 1)) {
+    if (++silent_looks_ >= silent_looks_most) known_ = false;
     return {IoError::no_answer, direction_, 0, rig::Reason::hm2_silent};
   }
+  silent_looks_ = 0;
   for (unsigned port = 0; port < ports_; ++port) {
     if (word32(answer, where + std::size_t{4} * port) != 0) return {IoError::read_back_mismatch, direction_};
   }
@@ -74,10 +110,9 @@ IoResult Hm2SafeState::look(std::int64_t wait_ns) noexcept {
 }
 
 IoResult Hm2SafeState::make_safe() noexcept {
-  if (!known_) {
-    const bool due = again_.due();
-    if (!due && link_) static_cast<void>(link_->send(zeros_.bytes()));
-    if (!due || !find_board()) return {IoError::disconnected, direction_, 0, rig::Reason::hm2_silent};
+  if (!known_ && (!again_.due() || !find_board())) {
+    const bool sent = link_ && link_->send(zeros_.bytes()) == 0;
+    return {sent ? IoError::no_answer : IoError::disconnected, direction_, 0, rig::Reason::hm2_silent};
   }
   if (const int error = link_->send(zeros_.bytes()); error != 0) {
     return {IoError::disconnected, direction_, error, rig::Reason::hm2_silent};

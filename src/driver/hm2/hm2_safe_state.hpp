@@ -30,6 +30,7 @@ class Hm2SafeState final : public SafeStateWriter {
  private:
   /// Where the board has what is written: as all known firmware has it, until its descriptors have been read.
   void learn(const Board& board) noexcept;
+  void identify(Link& link);
   [[nodiscard]] bool find_board() noexcept;
   [[nodiscard]] IoResult look(std::int64_t wait_ns) noexcept;
 
@@ -37,6 +38,8 @@ class Hm2SafeState final : public SafeStateWriter {
   OpenLink open_link_;
   std::unique_ptr<Link> link_{};
   bool known_{false};  ///< its descriptors have been read
+  bool tried_{false};  ///< to identify it
+  int silent_looks_{0};
   Reopening again_{};
   std::uint32_t number_{0};
   std::uint16_t direction_{0};

@@ -86,6 +86,15 @@ Obstacles obstacles_or_error(const fs::path& device) try {
   return {{error.what(), "compare with lspci -vv (docs/rig-setup.md)"}};
 }
 
+/// Without a lock: a run may have the card. No other register shows reliably that the card is absent.
+bool answers_all_ones(const std::string& file) try {
+  std::uint32_t version = 0;
+  return SysfsWindow(file, WindowUse::beside_guardian).read32(reg::bitstream_version, version).ok() &&
+         version == all_ones;
+} catch (const Unavailable&) {
+  return false;
+}
+
 FoundBoard surveyed(const fs::path& device) {
   const std::string file = (device / "resource2").string();
   FoundBoard board{.what = "RT-DAC4/PCI at " + device.filename().string(),
@@ -96,6 +105,10 @@ FoundBoard surveyed(const fs::path& device) {
     board.obstacles.push_back(
         {"registers not accessible to this user", "sudo chgrp abs_hil " + file + " && sudo chmod g+rw " + file +
                                                       "; for good: the udev rule of docs/rig-setup.md"});
+  }
+  if (board.obstacles.empty() && answers_all_ones(file)) {
+    board.obstacles.push_back(
+        {"answers all ones: it is not on the bus", "check its power, its slot and that its I/O decoding is enabled"});
   }
   if (board.obstacles.empty()) board.detail = "no kernel driver, enabled, registers accessible";
   return board;

@@ -159,6 +159,23 @@ TEST_CASE("The safe-state writer's look writes nothing while all pins are inputs
   CHECK(writer.verify_safe().ok());
 }
 
+TEST_CASE(
+    "While the safe-state writer identifies a board whose first zeros were lost, zeros go out before each request") {
+  Rig rig;
+  REQUIRE(rig.cycles(10, drive).ok());
+  Cable own(rig.board);
+  int sent = 0;
+  int while_on = 0;
+  own.loses_request = [&](const auto&) {
+    while_on += rig.is_on() ? 1 : 0;
+    return ++sent == 1;
+  };
+  hm2::Hm2SafeState writer({}, own.opener());
+  CHECK(writer.make_safe().ok());
+  CHECK(sent > 20);
+  CHECK(while_on == 3);  // the lost zeros, the look, the next zeros
+}
+
 TEST_CASE("A writer that has never been answered sends zeros to the usual addresses, and finds the board later") {
   Rig rig;
   REQUIRE(rig.cycles(10, drive).ok());
@@ -171,4 +188,24 @@ TEST_CASE("A writer that has never been answered sends zeros to the usual addres
   hm2::Hm2SafeState late({}, own.opener());
   CHECK_THROWS_AS(late.prepare(), Unavailable);
   CHECK_FALSE(late.make_safe().ok());
+}
+
+TEST_CASE("The safe-state writer reads the description of a board anew that was silent for three looks") {
+  RegisterBoard board;
+  Cable own(board);
+  int sent = 0;
+  own.loses_request = [&](const auto&) {
+    ++sent;
+    return false;
+  };
+  for (const int silent : {2, 3}) {
+    hm2::Hm2SafeState writer({}, own.opener());
+    writer.prepare();
+    own.loses_answer = [](const auto&) { return true; };
+    for (int look = 0; look < silent; ++look) CHECK_FALSE(writer.make_safe().ok());
+    own.loses_answer = [](const auto&) { return false; };
+    sent = 0;
+    CHECK(writer.make_safe().ok());
+    CHECK((sent > 10) == (silent == 3));
+  }
 }

@@ -58,6 +58,15 @@ TEST_CASE("Registers that cannot be opened are reported with the fix") {
   CHECK_THAT(boards.front().obstacles.front().fix, Contains("chmod g+rw"));
 }
 
+TEST_CASE("A card that answers all ones is not on the bus") {
+  FakeSystem system;
+  put_card(system, "0000:03:00.0", "1");
+  system.put(devices + "0000:03:00.0/resource2", std::string(256, '\xff'));
+  const auto boards = survey_cards(options_of(system));
+  REQUIRE(boards.front().obstacles.size() == 1);
+  CHECK_THAT(boards.front().obstacles.front().what, Contains("answers all ones"));
+}
+
 TEST_CASE("No folder of devices is no card") {
   FakeSystem system;
   CHECK(survey_cards(options_of(system)).empty());
