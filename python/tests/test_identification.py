@@ -20,7 +20,7 @@ from abs_hil.identification.logs import load_log, motion_of, segments_of
 from abs_hil.identification.parameters import FORMS
 from abs_hil.identification.problem import COUNT_VARIANCE, QUIET, Disturbances, Fit, Move, Problem, pieces_of
 from abs_hil.identification.program import main
-from abs_hil.identification.results import as_json, as_toml
+from abs_hil.identification.results import as_json, as_toml, equivalent_tyre
 
 MAGIC = FORMS['magic-formula']
 TRUTH = {'plant.theta_N': 26.0, 'plant.B': 24.0, 'plant.J1_kg_m2': 8.2e-3, 'plant.M10_Nm': 0.004, 'plant.c31_per_s': 17.0,
@@ -120,6 +120,22 @@ def test_logs_that_do_not_tell_the_form_leave_it_open(logs, start):
     assert all(found.parameters[name].low is None for name in ('theta_N', 'B', 'C'))
     holds = found.parameters['J1_kg_m2']  # what both forms share
     assert holds.status == 'identified' and holds.low <= truth_of('J1_kg_m2') <= holds.high
+
+
+def test_a_start_with_the_magic_formula_on_the_lever_has_both_forms_tried_with_its_load(tmp_path):
+    tyre = {'plant.tyre': 'magic-formula', 'plant.load': 'lever', 'plant.mu_peak': 0.42, 'plant.B': 24.0}
+    start = tmp_path / 'start.toml'
+    start.write_text('description = "start"\n[plant]\ntyre = "magic-formula"\nload = "lever"\nmu_peak = 0.36\n')
+    found = abs_hil.identify([log_of(name, tyre, (0.3, 0.8)) for name in ('lifted', 'duty-ramp', 'locked-stop', 'pulses')], start)
+    assert not found.misfit and found.form == 'magic-formula', found.misfit
+    for name, truth in (('mu_peak', 0.42), ('B', 24.0), ('lever_Mg_Nm', abs_hil.keys()['plant.lever_Mg_Nm']['value'])):
+        assert found.parameters[name].status == 'identified' and found.parameters[name].value == pytest.approx(truth, rel=1e-3)
+    model = tmp_path / 'model.toml'
+    model.write_text(as_toml(found))
+    assert abs_hil.keys(plant=model)['plant.load']['value'] == 'lever'
+    believed = abs_hil.keys(plant=model, model=model)
+    for name, value in equivalent_tyre(found.fit.problem.base, found.values()).items():
+        assert believed[f'model.{name}']['value'] == value
 
 
 def test_acceleration_alone_promises_nothing_of_brake_and_tyre(logs, start):

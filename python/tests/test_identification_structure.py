@@ -1,5 +1,6 @@
 """abs_hil.identify on rigs with a brake or tyre of their own: it finds what the plant has, and refuses the rest by name."""
 import pathlib
+import re
 import sys
 import tomllib
 
@@ -8,8 +9,9 @@ import pytest
 
 import abs_hil
 from abs_hil.core import _core
-from abs_hil.identification import program
+from abs_hil.identification import program, structure
 from abs_hil.identification.advice import information, log_of
+from abs_hil.identification.brake_flaws import leaky
 from abs_hil.identification.logs import motion_of
 from abs_hil.identification.results import as_toml
 from abs_hil.identification.slots import middles, slots_of
@@ -152,3 +154,47 @@ def test_friction_that_falls_with_the_cars_speed_is_refused_by_name(tmp_path, mo
     assert program.main(['any', '--no-report', '--force', '--out', str(tmp_path)]) == program.MISFIT
     assert "the friction changes with the lower wheel's speed" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ['identified.json']
+
+
+def following(part, factor):
+    """Logs of a rig on which this factor over `part` follows the log and its states (angles, speeds, torque)."""
+    logs = []
+    for name in EXPERIMENTS:
+        log, profile = log_of(name, SETTINGS), ''
+        for _ in range(6):  # the states follow the factor, too
+            base = _core.PlantOptions(options(set={**SETTINGS, f'plant.{part}_profile': profile}))
+            states = _core.trajectory(base, [], log.inputs(), np.zeros(5))
+            at = np.arange(0, len(log), 10)
+            knots = zip(factor(log, states)[at], log.time_s[at], log.time_s[at[1:]])
+            profile = 'time: 1; ' + '; '.join(f'{value:.6f} from {a:.3f} to {b:.3f}' for value, a, b in knots)
+        log.counts = _core.encoder_counts(base, states[:, :2]).astype(float)
+        logs.append(log)
+    return logs
+
+
+@pytest.mark.parametrize(('part', 'factor', 'words'), [
+    ('motor_torque', lambda log, _: 1.0 - 0.02 * leaky(log, 1 / 8, log.motor_pwm), 'the motor gets weaker with its use'),
+    ('brake_torque', lambda _, states: 0.88 + 0.0012 * states[:, 2], "the brake's torque changes with the upper wheel's speed"),
+    ('brake_torque', lambda _, states: 1.0 + 0.1 * np.sin(states[:, 0]), "the brake's torque follows the upper wheel's angle")])
+def test_what_the_plant_lacks_is_named_with_a_phase_in_which_it_acts_and_without_advice(part, factor, words):
+    found = identify(following(part, factor))
+    assert f': {words} (' in found.misfit, found.misfit
+    log, phase = re.search(r'most in ([\w-]+), phase ([\w-]+)', found.misfit).groups()
+    named = next(one for one in found.logs if one.name == log)
+    duty = named.motor_pwm if part == 'motor_torque' else named.brake_pwm
+    assert np.any(duty[named.phase == phase] > 0.0), (log, phase)
+    assert not any('lifted' in note and 'run' in note for note in found.notes[1:])
+
+
+def test_a_cause_that_was_tried_or_leaves_others_is_not_stated(monkeypatch):
+    monkeypatch.setattr(structure, '_where', lambda *_: ('locked', 'brake'))
+    causes = {cause.words: cause for cause in structure.CAUSES}
+    falls, acts_late, by_speed = (causes[words] for words in (
+        'the friction falls with the sliding speed', 'the brake acts late', "the friction changes with the lower wheel's speed"))
+    said = structure.sentence([structure.Found(falls, 0.02, 31.0, 1.0), structure.Found(acts_late, 1e-3, 12.0, 1.0)], None)
+    assert 'the cause is none that it has: it is most as if the friction falls with the sliding speed (0.02 per m/s, 31' in said
+    assert 'plant.friction_fall_s_m, plant.brake_dead_time_s: tried, and no explanation' in said
+    rises = structure.Found(falls, -0.02, 31.0, 1.0)  # the plant cannot have that: nothing was tried
+    assert 'plant: the friction rises' in structure.sentence([rises], None)
+    assert 'as if the friction changes' in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, rest=20.0)], None)
+    assert 'plant: the friction changes' in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, rest=3.0)], None)

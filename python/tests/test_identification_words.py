@@ -78,11 +78,17 @@ def test_a_duty_below_which_the_brake_gives_nothing_is_u0_and_no_experiment_is_a
 
 
 def test_an_experiment_among_the_logs_is_not_asked_for_again():
-    coast = log_of('coast-down', {})
+    coast = log_of('coast-and-brake', {})
     notes = abs_hil.identify([coast], form='magic-formula').notes
     assert any('M10_Nm' in note and note.endswith('run: lifted') for note in notes)
-    assert any('b1_Nm' in note and note.endswith('run: duty-ramp') for note in notes)
+    assert any('motor_stall_torque_Nm' in note and note.endswith('run: pulses') for note in notes)
     notes = abs_hil.identify([dataclasses.replace(coast, experiment='lifted')], form='magic-formula').notes
     assert any('M10_Nm' in note and 'lifted is among the logs and did not suffice' in note for note in notes)
     assert not any('run: lifted' in note for note in notes)
-    assert any('b1_Nm' in note and note.endswith('run: duty-ramp') for note in notes)
+    assert any('motor_stall_torque_Nm' in note and note.endswith('run: pulses') for note in notes)
+    # In a refusal only where it is known what was run, and only what was not.
+    refused = log_of('locked-stop', {})
+    for experiment, asked in (('locked-stop', True), ('', False)):
+        found = abs_hil.identify([dataclasses.replace(refused, experiment=experiment)], form='magic-formula')
+        assert found.misfit and any('run: lifted' in note for note in found.notes) == asked
+        assert not any('among the logs' in note for note in found.notes)

@@ -87,17 +87,17 @@ def full_Nm(values: Mapping[str, float]) -> float:
 def heat_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
     """E at each row."""
     power = brake_torques(log, values) * np.where(motion.stands[:, 0], 0.0, np.maximum(motion.speed_rad_s[:, 0], 0.0))
-    return _cooling(log, values, power)
+    return leaky(log, values.get(COOLING.key, 0.0), power)
 
 
 def _recovered(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
     """-k dE/dq."""
-    return values.get(FADING.key, 0.0) * _cooling(log, values, heat_J(log, motion, values))
+    return values.get(FADING.key, 0.0) * leaky(log, values.get(COOLING.key, 0.0), heat_J(log, motion, values))
 
 
-def _cooling(log: Log, values: Mapping[str, float], comes: np.ndarray) -> np.ndarray:
-    """x of x' = comes - q x, from 0, at each row. What comes between two rows comes in the middle."""
-    keeps = float(np.exp(-values.get(COOLING.key, 0.0) * log.period_s))
+def leaky(log: Log, leaves_per_s: float, comes: np.ndarray) -> np.ndarray:
+    """x of x' = comes - leaves x, from 0, at each row. What comes between two rows comes in the middle."""
+    keeps = float(np.exp(-leaves_per_s * log.period_s))
     comes = np.concatenate([[0.0], 0.5 * (comes[1:] + comes[:-1]) * np.diff(log.time_s)])
     return np.asarray(scipy.signal.lfilter([np.sqrt(keeps)], [1.0, -keeps], comes))
 

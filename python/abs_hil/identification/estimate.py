@@ -12,8 +12,8 @@ from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
 from .linear import run_filter, step
 from .logs import Log, load_log, motion_of
-from .parameters import FORMS, WHEELS, checked_keys
-from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
+from .parameters import ALL_FORMS, FORMS, WHEELS, checked_keys
+from .problem import DISTURBANCES, LARGEST_QUIET_RMS, QUIET, Fit, Problem
 
 #: the wheels' radii differ by less than this factor: further from 1, the wheels did not roll on each other
 LARGEST_RATIO = 1.5
@@ -66,9 +66,11 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
 
     fits: list[Fit] = []
     begun: list[Fit] = []
-    for name in FORMS if form == 'auto' else (form,):
-        say(f'{FORMS[name].meaning}: first values')
-        problem = Problem.of(FORMS[name], start, loaded, fix, drift, WHEELS)
+    forms = FORMS if FORMS[start_form].settings['plant.load'] == given['load'] else {
+        one.name: one for one in ALL_FORMS if one.settings['plant.load'] == given['load']}
+    for tried in forms.values() if form == 'auto' else (forms[form],):
+        say(f'{tried.meaning}: first values')
+        problem = Problem.of(tried, start, loaded, fix, drift, WHEELS)
         if not any(problem.segments):
             upper, lower = np.max([motion.speed_rad_s.max(axis=0) for motion in problem.motions], axis=0)
             raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s): with '
@@ -79,7 +81,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
             # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
             fits.append(choices.started(begun[-1], check))
         except (ValueError, np.linalg.LinAlgError) as error:
-            notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
+            notes.append(f'{tried.meaning}: cannot be fitted ({error})')
     if not fits:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
     fit, decided = (fits[0], True) if len(fits) == 1 else choices.better_form(fits, start_form, check, say, notes)
@@ -91,7 +93,10 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     found = assembled(finished, str(start), notes)
     name_disagreement(found)
     if why := _doubt(found, finished):
-        refuse(found, why, of_logs)
+        causes = finished.causes or finished.hidden
+        off = (causes[0].cause.acts if causes else
+               DISTURBANCES[int(np.argmax(finished.disturbances.sd[:3]))] if finished.disturbances is not None else '')
+        refuse(found, why, of_logs, not decided or (form == 'auto' and off == 'road'))
     elif not decided:
         leave_form_open(found)
     return found
@@ -105,16 +110,17 @@ def _doubt(found: Identified, finished: Finished) -> str:
         return (f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
                 f'{LARGEST_RMS:g} is expected even of a rig that wanders')
     odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
+    hidden = f'{structure.sentence(finished.hidden, finished.fit)}. If that is not it: ' if finished.hidden else ''
     factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
     if found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
         return 'the fit does not settle: the logs tell too little, or the model does not follow them'
     if factor > LARGEST_WANDER:
-        return (f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % would '
-                'explain them with one set of parameters. Are they of one rig, and of one state of its brake and tyre?')
+        return (f'{hidden}the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % '
+                'would explain them with one set of parameters. Are they of one rig, and of one state of its brake and tyre?')
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
-        return (f'the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, expected 1); '
-                'is it of another rig, has something changed between the logs, or is the brake weaker in some of them '
-                '(--drift brake_torque)?')
+        return (f'{hidden}the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, '
+                'expected 1); is it of another rig, has something changed between the logs, or is the brake weaker in some of '
+                'them (--drift brake_torque)?')
     return ''
 
 
@@ -124,6 +130,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     undisturbed = _undisturbed(fit.copy(), check, say)
     quiet = undisturbed is not None and undisturbed.rms_counts <= LARGEST_QUIET_RMS
     causes: list[structure.Found] = []
+    first_causes: list[structure.Found] = []
     cost = 0.0
     if undisturbed is not None and quiet:
         fit = undisturbed
@@ -135,8 +142,9 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
             fit = disturbed_fit(fit, check, say)
             limited = choices.started(fit, check)
             fit = fit if limited is fit else disturbed_fit(limited, check, say)
-            again, causes = structure.explained(fit, fit.disturbances, check, say)
-            fit = fit if again is fit else disturbed_fit(again, check, say)
+            while (found := structure.explained(fit, fit.disturbances, check, say))[0] is not fit:
+                fit = disturbed_fit(found[0], check, say)
+            causes = found[1]
             if first_causes and any(one.cause is first_causes[0].cause for one in causes):
                 causes = first_causes  # surer
         except (ValueError, np.linalg.LinAlgError) as error:
@@ -149,7 +157,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes, cost)
+    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes, first_causes, cost)
 
 
 def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:

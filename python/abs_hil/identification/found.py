@@ -7,7 +7,7 @@ import numpy as np
 
 from . import choices, discs, intervals, structure
 from .logs import Log
-from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, FORMS, GIVEN, RATE_LIMIT, WHEELS
+from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
@@ -44,8 +44,8 @@ class Estimate:
 @dataclass
 class Identified:
     """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell; misfit: why the
-    logs give no model of the plant, empty if they do; undecided: they do not tell the form, which is then the start's;
-    wanted: those notes that say what to run."""
+    logs give no model of the plant, empty if they do; undecided: they do not tell the form of the tyre, or their tyre is
+    of no form; wanted: those notes that say what to run."""
     form: str
     start: str
     parameters: dict[str, Estimate]
@@ -71,14 +71,15 @@ class Identified:
 @dataclass
 class Finished:
     """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
-    discs that no log shows, what the disturbances have in common that the plant lacks, and
-    -2 log likelihood with small disturbances and the surest of those causes."""
+    discs that no log shows, what the disturbances have in common that the plant lacks, what small ones had that these took up,
+    and -2 log likelihood with small disturbances and the surest of those causes."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
     disturbances: Disturbances | None
     round_discs: dict[str, float]
     causes: list[structure.Found] = field(default_factory=list)
+    hidden: list[structure.Found] = field(default_factory=list)
     cost: float = 0.0
 
 
@@ -94,11 +95,12 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     return found
 
 
-def refuse(found: Identified, why: str, of_logs: list[str]) -> None:
+def refuse(found: Identified, why: str, of_logs: list[str], undecided: bool) -> None:
     """The logs do not fit the plant: the values are the last ones of the fit, and nothing is promised of them."""
-    found.misfit = why
+    found.misfit, found.undecided = why, undecided
     found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written',
-                      *of_logs, *found.wanted]
+                      *(note for note in of_logs if not (undecided and note.startswith('form: '))),
+                      *(note for note in found.wanted if all(log.experiment for log in found.logs) and 'among the' not in note)]
     without_intervals(found)
 
 
@@ -107,7 +109,7 @@ def leave_form_open(found: Identified) -> None:
     found.undecided = True
     found.misfit = ('the logs do not tell the form of tyre and load. Run: slip-sweep or locked-stop, or name it with --form')
     found.notes.insert(0, f'{found.misfit}. The tyre has no interval, and no model.toml is written')
-    for p in FORMS[found.form].tyre:
+    for p in found.fit.problem.form.tyre:
         found.parameters[p.key].withdraw()
     found.combinations.pop('theta_B_C_N', None)
 

@@ -1,4 +1,4 @@
-"""What can be identified: one row for each parameter, and the two forms of the plant."""
+"""What can be identified: one row for each parameter, and the forms of the plant."""
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -44,13 +44,14 @@ _SHARED = (
     Parameter('motor_stall_torque_Nm', 'N m', 'motor', 'pulses', most=90.0),
     Parameter('motor_no_load_speed_rad_s', 'rad/s', 'motor', 'lifted', most=1900.0),
 )
+_THETA = Parameter('theta_N', 'N', 'contact', 'slip-sweep or locked-stop', most=450.0)
+_LEVER = Parameter('lever_Mg_Nm', 'N m', 'contact', 'slip-sweep and pulses', most=900.0)
+_MU_PEAK = Parameter('mu_peak', '1', 'contact', 'slip-sweep or locked-stop', most=9.0)
 _MAGIC = (
-    Parameter('theta_N', 'N', 'contact', 'slip-sweep or locked-stop', most=450.0),
     Parameter('B', '1', 'contact', 'slip-sweep', most=190.0),
     Parameter('C', '1', 'contact', 'slip-sweep or locked-stop', most=2.0),
 )
-_LEVER = (
-    Parameter('lever_Mg_Nm', 'N m', 'contact', 'slip-sweep and pulses', most=900.0),
+_MAKERS = (
     Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop', most=9.0),
     Parameter('mu_a', '1', 'contact', 'slip-sweep', most=9.0, prior=2.0),
     Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
@@ -100,12 +101,19 @@ class Form:
         return tuple(p for p in self.parameters if p not in _SHARED)
 
 
-FORMS = {
-    'magic-formula': Form('magic-formula', 'magic formula, constant load',
-                          {'plant.tyre': 'magic-formula', 'plant.load': 'constant'}, _SHARED + _MAGIC, ('theta_N',)),
-    'inteco-mu': Form('inteco-mu', "the maker's curve, load by the lever",
-                      {'plant.tyre': 'inteco-mu', 'plant.load': 'lever'}, _SHARED + _LEVER, ('mu_w4',)),
-}
+def _form(tyre: str, load: str, own: tuple[Parameter, ...], road: str) -> Form:
+    meaning = ', '.join(({'magic-formula': 'magic formula', 'inteco-mu': "the maker's curve"}[tyre],
+                         {'constant': 'constant load', 'lever': 'load by the lever'}[load]))
+    return Form(tyre, meaning, {'plant.tyre': tyre, 'plant.load': load}, _SHARED + own, (road,))
+
+
+#: all pairs of a tyre and a load
+ALL_FORMS = (_form('magic-formula', 'constant', (_THETA, *_MAGIC), 'theta_N'),
+             _form('inteco-mu', 'lever', (_LEVER, *_MAKERS), 'mu_w4'),
+             _form('magic-formula', 'lever', (_LEVER, _MU_PEAK, *_MAGIC), 'mu_peak'),
+             _form('inteco-mu', 'constant', (_THETA, *_MAKERS), 'theta_N'))
+#: by tyre, those that are tried unless the start is one of the others
+FORMS = {one.name: one for one in ALL_FORMS[:2]}
 
 #: combinations that are known where their parts are not: name -> unit, parts, what tells them apart
 COMBINATIONS = {
@@ -131,7 +139,7 @@ def base_options(form: Form, start: PathLike) -> Any:
 
 def checked_keys(fixed: Mapping[str, float | None], start: PathLike) -> None:
     """Raises ValueError for a key that is no parameter of any form, and for a value outside its range."""
-    known = {p.key for form in FORMS.values() for p in form.parameters} | {*GIVEN, RATE_LIMIT.key}
+    known = {p.key for form in ALL_FORMS for p in form.parameters} | {*GIVEN, RATE_LIMIT.key}
     for key in fixed:
         if key not in known:
             raise ValueError(f'--fix {key}: no such parameter; give one of {", ".join(sorted(known))}')

@@ -21,6 +21,8 @@ WINDOW_DISTURBED_S = 0.02
 #: a residual above this has other sources than the counts' steps, counts RMS
 LARGEST_QUIET_RMS = 0.30
 DISTURBANCES = ('road', 'brake', 'motor', 'upper bearing', 'lower bearing')
+#: of factors and, in N m, bearings: less is no reason to refuse a rig
+LEAST_SD = np.array([1e-3, 1e-3, 1e-3, 5e-4, 5e-4])
 
 
 @dataclass
@@ -32,6 +34,10 @@ class Disturbances:
     @classmethod
     def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Self:
         return cls(np.array([factor, factor, factor, torque_Nm, torque_Nm]), np.full(5, time_constant_s))
+
+    def times(self, share: float) -> 'Disturbances':
+        """A share of them, but not so little that what no rig needs to say would count."""
+        return self if share == 1.0 else dataclasses.replace(self, sd=np.maximum(share * self.sd, LEAST_SD))
 
     def __str__(self) -> str:
         factors = ', '.join(f'{name} {100 * sd:.2g} %' for name, sd in zip(DISTURBANCES[:3], self.sd))

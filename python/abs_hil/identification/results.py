@@ -18,7 +18,7 @@ from .parameters import DELAY, FORMS, WHEELS
 _DOING = ('control.', 'experiment.', 'observer.', 'gate.')
 #: a run's gate.* belongs to its board where it names board limits
 _LEFT_OUT = ('gate.brake_duty_max', 'gate.motor_duty_max')
-#: of the form inteco-mu, what no log tells
+#: of a form with the maker's curve or lever, what no log tells
 _OF_THE_START = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
 
 
@@ -48,7 +48,7 @@ def as_toml(found: Identified) -> str:
         _, interval = shown(estimate)
         return f'{key} = {_number(estimate.value)}  # {estimate.unit}: {estimate.status}' + (interval and ', ' + interval)
 
-    form = FORMS[found.form]
+    form = found.fit.problem.form
     base = found.fit.problem.base.values()
     lines = [f'# Identified by abs_identify {_core.version} on {datetime.date.today().isoformat()}: value, then status and '
              'interval of 95 %.',
@@ -60,7 +60,7 @@ def as_toml(found: Identified) -> str:
               *(f'{key.removeprefix("plant.")} = "{value}"' for key, value in form.settings.items())]
     lines += [line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
     lines.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')
-    if found.form == 'inteco-mu':
+    if found.fit.problem.form is not FORMS['magic-formula']:
         lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in _OF_THE_START]
     believed = _believed(found)
     return '\n'.join([*lines, *(['', '[model]', *believed] if believed else [])]) + '\n'
@@ -69,8 +69,8 @@ def as_toml(found: Identified) -> str:
 def _believed(found: Identified) -> list[str]:
     """Lines of the table [model]: where controllers believe something else than the plant."""
     lines = []
-    if found.form == 'inteco-mu':
-        lines.append("# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking.")
+    if found.fit.problem.form is not FORMS['magic-formula']:
+        lines.append("# What controllers believe of the tyre: the magic formula nearest to the plant's force in braking.")
         tyre = equivalent_tyre(found.fit.problem.base, found.values())
         lines += [f'{key} = {_number(value)}' for key, value in tyre.items()]
     for wheel in WHEELS:
@@ -118,10 +118,10 @@ def equivalent_tyre(base: Any, values: Mapping[str, float]) -> dict[str, float]:
 def plant_settings(found: Identified) -> dict[str, Any]:
     """--set for the identified plant."""
     base = found.fit.problem.base.values()
-    settings: dict[str, Any] = dict(FORMS[found.form].settings)
+    settings: dict[str, Any] = dict(found.fit.problem.form.settings)
     settings.update({f'plant.{key}': value for key, value in found.values().items() if key in base})
     settings['plant.encoder_counts_per_rev'] = base['encoder_counts_per_rev']
-    if found.form == 'inteco-mu':
+    if found.fit.problem.form is not FORMS['magic-formula']:
         settings.update({f'plant.{key}': base[key] for key in _OF_THE_START})
     return settings
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .brake_flaws import amounts, brake_torques, fallen, full_Nm, static_torques
-from .linear import _relative, by_windows, keep_normals, left_out_cost, linearise, run_filter, to_rest
-from .parameters import COOLING, CURVATURE, DEAD_TIME, DELAY, FADING, FRICTION_FALL, HYSTERESIS, RELEASE
+from .brake_flaws import amounts, brake_torques, fallen, full_Nm, leaky, static_torques
+from .linear import _relative, by_windows, keep_normals, left_out_cost, linearise, run_filter, solved, to_rest
+from .logs import Log
+from .parameters import COOLING, CURVATURE, DEAD_TIME, DELAY, FADING, FLAWS, FRICTION_FALL, HYSTERESIS, RELEASE, WHEELS
 from .problem import DISTURBANCES, Disturbances, Fit, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
@@ -23,6 +24,8 @@ SURE = 5.0
 #: a flaw is tried in place of a surer cause if it is this share as sure, and taken if that cause is then half as sure
 WORTH_A_TRY = 0.3
 STILL_THERE = 0.5
+#: a cause may be what the disturbances stand for: it is tried with these shares of them, too
+SHARES = (1.0, 0.1)
 
 
 @dataclass
@@ -37,14 +40,15 @@ class Signals:
     angle_rad: np.ndarray
     sliding_m_s: np.ndarray
     brakes_alone: np.ndarray
-    time_s: np.ndarray
+    log: Log
 
 
 @dataclass(frozen=True)
 class Cause:
     """words, against: what a positive and a negative coefficient mean; acts: the disturbance that it would be
     (problem.DISTURBANCES), or the parameter; follows: what that would follow, at each row, in `unit`; flaw: the parameter of
-    the plant that describes it, if there is one: its value is `none` plus the coefficient."""
+    the plant that describes it, if there is one: its value is `none` plus the coefficient. What follows an angle, by its sine
+    and cosine, has a phase of its own in each log: counters may begin anew."""
     words: str
     unit: str
     acts: str
@@ -69,33 +73,40 @@ CAUSES = (
     Cause('the friction falls with the sliding speed', 'per m/s', 'road', lambda s: -s.sliding_m_s, FRICTION_FALL.key,
           'the friction rises with the sliding speed'),
     Cause("the friction changes with the lower wheel's speed", 'per rad/s', 'road', lambda s: s.omega_rad_s[:, 1]),
-    Cause('the friction changes with time', 'per s', 'road', lambda s: s.time_s),
-    Cause("the friction follows the lower wheel's angle", 'at the sine', 'road', lambda s: np.sin(s.angle_rad[:, 1])),
-    Cause("the friction follows the lower wheel's angle", 'at the cosine', 'road', lambda s: np.cos(s.angle_rad[:, 1])),
-    Cause("the friction follows the upper wheel's angle", 'at the sine', 'road', lambda s: np.sin(s.angle_rad[:, 0])),
-    Cause("the friction follows the upper wheel's angle", 'at the cosine', 'road', lambda s: np.cos(s.angle_rad[:, 0])),
-    Cause('the motor changes with time', 'per s', 'motor', lambda s: s.time_s),
-    Cause("the upper wheel's bearing drags with the square of its speed", 'N m s^2', 'upper bearing',
-          lambda s: s.omega_rad_s[:, 0]**2),
-    Cause("the lower wheel's bearing drags with the square of its speed", 'N m s^2', 'lower bearing',
-          lambda s: s.omega_rad_s[:, 1]**2),
+    Cause('the friction changes with time', 'per s', 'road', lambda s: s.log.time_s - s.log.time_s[0]),
+    *(Cause(words.format(wheel), 'of itself', acts,
+            lambda s, at=at: np.stack([np.sin(s.angle_rad[:, at]), np.cos(s.angle_rad[:, at])], axis=1))  # type: ignore[misc]
+      for words, acts, wheels in (("the friction follows the {} wheel's angle", 'road', WHEELS),
+                                  ('the {} wheel is not round', 'r1_m', WHEELS),
+                                  ("the brake's torque follows the {} wheel's angle", 'brake', WHEELS[:1]))
+      for at, wheel in enumerate(wheels)),
+    Cause('the motor changes with time', 'per s', 'motor', lambda s: s.log.time_s - s.log.time_s[0]),
+    *(Cause('the motor gets weaker with its use', f'per s of full duty, over {recovers_s:g} s', 'motor',
+            lambda s, leaves=1.0 / recovers_s: -leaky(s.log, leaves, s.log.motor_pwm), '',  # type: ignore[misc]
+            'the motor gets stronger with its use') for recovers_s in (3.0, 10.0, 30.0)),
+    *(Cause(f"the {wheel} wheel's bearing drags with the square of its speed", 'N m s^2', f'{wheel} bearing',
+            lambda s, at=at: s.omega_rad_s[:, at]**2) for at, wheel in enumerate(WHEELS)),  # type: ignore[misc]
 )
 
 
 @dataclass
 class Found:
-    """A cause with its coefficient and its standard deviation."""
+    """A cause with its coefficient; sure: what it takes off -2 log likelihood, as a number of standard deviations; that
+    with the share of the disturbances that is likeliest with it; rest: how sure the surest of the others is beside it."""
     cause: Cause
     coefficient: float
-    sd: float
-
-    @property
-    def sure(self) -> float:
-        return abs(self.coefficient) / self.sd
+    sure: float
+    share: float
+    rest: float = 0.0
 
     @property
     def words(self) -> str:
         return self.cause.against if self.coefficient < 0.0 and self.cause.against else self.cause.words
+
+    @property
+    def flaw(self) -> str:
+        """The plant's parameter that may describe it, with this sign."""
+        return next((one.key for one in FLAWS if one.key == self.cause.flaw and one.least < one.none + self.coefficient), '')
 
 
 def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
@@ -107,21 +118,41 @@ def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
                         free=np.append(fit.free, False))
     wide.scale = linearise(wide.problem, wide.values, wide.pieces)
     causes = [one for one in CAUSES if one.flaw not in wide.problem.flaws]
-    N, n = _normals(wide, disturbances, causes)
-    size = len(wide.scale)
     precision, towards = wide.prior()
-    N[np.arange(size), np.arange(size)] += precision
-    n[:size] += towards
+    size, equations, bases = len(precision), [], []
+    for share in SHARES:
+        N, n, cost, places = _normals(wide, disturbances.times(share), causes)
+        N[np.arange(size), np.arange(size)] += precision
+        n[:size] += towards
+        equations.append((N, n))
+        bases.append(cost - float(n[:size] @ solved(wide, N[:size, :size] - np.diag(precision), n[:size] - towards)))
+    more = [base - min(bases) for base in bases]
     free = np.flatnonzero(wide.free)
-    out = []
-    for number, cause in enumerate(causes):
-        place = size + number
-        if not N[place, place] > 0.0:
-            continue  # nothing in these logs would show it
-        at = np.append(free, place)
-        covariance = inverse(N[np.ix_(at, at)])
-        out.append(Found(cause, float(covariance[-1] @ n[at]), float(np.sqrt(covariance[-1, -1]))))
-    return sorted(out, key=lambda one: -one.sure)
+    shown = [(cause, at[np.diag(N)[at] > 0.0]) for cause, at in zip(causes, places)]  # by these logs
+
+    def found(cause: Cause, at: np.ndarray, beside: np.ndarray, costs: Sequence[float]) -> Found:
+        gain, x, share = max((gain - cost, x, share) for one, share, cost in zip(equations, SHARES, costs)
+                             for x, gain in (_gain(*one, beside, at),))
+        return Found(cause, x, float(np.sqrt(max(gain, 0.0))), share)
+    of = [(found(cause, at, free, more), at) for cause, at in shown if at.size]
+    of.sort(key=lambda one: -one[0].sure)
+    for surest, beside in of[:1]:
+        with_it = [cost - _gain(*one, free, beside)[1] for one, cost in zip(equations, more)]
+        beside, more = np.append(free, beside), [cost - min(with_it) for cost in with_it]
+        surest.rest = max((found(one.cause, at, beside, more).sure for one, at in of[1:]), default=0.0)
+    return [one for one, _ in of]
+
+
+def _gain(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> tuple[float, float]:
+    """Of the columns `at`, alone but for what is `beside` them: the coefficient, or the largest of an angle's, and what they
+    take off -2 log likelihood, less what nothing would take off with more columns than one."""
+    chosen = np.append(beside, at)
+    some = N[np.ix_(chosen, chosen)]
+    some[np.arange(len(beside), len(chosen)), np.arange(len(beside), len(chosen))] *= 1.0 + 1e-9  # two may be one
+    covariance = inverse(some)
+    x, own = (covariance @ n[chosen])[-at.size:], covariance[-at.size:, -at.size:]
+    size = x[0] if at.size == 1 else np.hypot(x[::2], x[1::2]).max()
+    return float(size), float(x @ np.linalg.solve(own, x)) - 2.0 * (at.size - 1)
 
 
 def _signals(fit: Fit) -> list[Signals]:
@@ -135,39 +166,47 @@ def _signals(fit: Fit) -> list[Signals]:
         sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
         flaws = amounts(log, motion, brake, (FADING.key, COOLING.key, DEAD_TIME.key))
         out.append(Signals(torque, static, full_Nm(brake), -flaws[FADING.key], flaws[COOLING.key], omega, motion.smooth_rad,
-                           sliding, flaws[DEAD_TIME.key], log.time_s - log.time_s[0]))
+                           sliding, flaws[DEAD_TIME.key], log))
     return out
 
 
-def _normals(fit: Fit, disturbances: Disturbances, causes: Sequence[Cause]) -> tuple[np.ndarray, np.ndarray]:
-    """The normal equations with a column for each cause behind the parameters'."""
+def _normals(fit: Fit, disturbances: Disturbances,
+             causes: Sequence[Cause]) -> tuple[np.ndarray, np.ndarray, float, list[np.ndarray]]:
+    """The normal equations with columns for the causes behind the parameters', their constant, and each cause's places."""
     problem, keys = fit.problem, fit.keys
     way = _relative(problem, fit.values, fit.scale)
-    follows = [[cause.follows(one) for cause in causes] for one in _signals(fit)]
-    directions = np.zeros((len(keys), len(causes)))
+    follows = [[cause.follows(one).reshape(len(one.log), -1) for cause in causes] for one in _signals(fit)]
+    widths = [one.shape[1] for one in follows[0]]
+    logs, size = len(follows), len(keys)
+    ends = size + np.cumsum([width * (logs if width > 1 else 1) for width in widths])
+    places = [np.arange(begin, end) for begin, end in zip([size, *ends], ends)]
+    directions = np.zeros((size, len(causes)))
     for number, cause in enumerate(causes):
         if cause.acts in DISTURBANCES:
             directions[:, number] = way[DISTURBANCES.index(cause.acts)]
         else:
             i = keys.index(cause.acts)
             directions[i, number] = 1.0 / fit.scale[i] if cause.acts == DELAY else fit.values[cause.acts] / fit.scale[i]
-    size = len(keys)
-    N, n = np.zeros((size + len(causes),) * 2), np.zeros(size + len(causes))
+    directions = np.repeat(directions, widths, axis=1)
+    N, n, cost = np.zeros((ends[-1],) * 2), np.zeros(ends[-1]), 0.0
     for piece in fit.pieces:
         at, linear = piece.columns, dict(piece.linear)
-        share = np.stack([by_windows(piece, per_row) for per_row in follows[piece.log]], axis=1)
+        per_row = np.concatenate(follows[piece.log], axis=1)
+        share = np.stack([by_windows(piece, one) for one in per_row.T], axis=1)
         rows = np.repeat(share, np.diff(piece.first), axis=0)
         for name, of in (('by_parameter', rows), ('end_by_parameter', share)):
             more = linear[name] @ directions[at] * of[:, None, :]
             linear[name] = np.ascontiguousarray(np.concatenate([linear[name], more], axis=2))
         linear.update(_core.condense(linear))
-        wider = np.concatenate([way[:, at], np.zeros((len(way), len(causes)))], axis=1)
-        part, right, *_ = _core.filter_pieces([linear], np.ascontiguousarray(wider), disturbances.sd,
-                                              disturbances.time_constant_s, problem.variance_rad2)[0]
-        place = np.concatenate([at, size + np.arange(len(causes))])
+        wider = np.concatenate([way[:, at], np.zeros((len(way), sum(widths)))], axis=1)
+        part, right, square, log_variance, _ = _core.filter_pieces(
+            [linear], np.ascontiguousarray(wider), disturbances.sd, disturbances.time_constant_s, problem.variance_rad2)[0]
+        cost += float(square[0]) + log_variance
+        own = [one[width * piece.log:][:width] if width > 1 else one for one, width in zip(places, widths)]
+        place = np.concatenate([at, *own])
         N[np.ix_(place, place)] += part
         n[place] += right[:, 0]
-    return N, n
+    return N, n, cost, places
 
 
 def explained(fit: Fit, disturbances: Disturbances, check: Callable[[], None],
@@ -189,7 +228,7 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
                  check: Callable[[], None]) -> tuple[Fit, Cause] | None:
     surest = causes[0]
     for one in causes:
-        if not one.cause.flaw or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
+        if not one.flaw or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
             continue
         flawed = _with_flaw(fit, one, disturbances, check)
         if flawed is None:
@@ -201,19 +240,17 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
 
 
 def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
-    """The fit with one more flaw; None if it is not there after all: of another sign, not sure by the likelihood, or against
-    what logs that are left out say."""
-    key = found.cause.flaw
+    """The fit with one more flaw; None if it is not there after all: not sure by the likelihood, or against what logs that
+    are left out say."""
+    key = found.flaw
     problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
     at = [p.key for p in problem.parameters].index(key)
     flaw = problem.parameters[at]
-    value = flaw.none + found.coefficient
-    if not flaw.least < value:
-        return None
-    value = min(value, 0.9 * flaw.most)
+    value = min(flaw.none + found.coefficient, 0.9 * flaw.most)
     flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
-    to_rest(flawed, disturbances, 6, check)
-    with_it, without = _against(flawed, disturbances, key), _against(fit, disturbances)
+    less = disturbances.times(found.share)
+    to_rest(flawed, less, 6, check)
+    with_it, without = _against(flawed, less, key), min(_against(fit, disturbances.times(share)) for share in {1.0, found.share})
     return flawed if with_it[0] < without[0] - SURE**2 and sum(with_it) < sum(without) else None
 
 
@@ -226,29 +263,34 @@ def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> tuple[f
 
 
 def sentence(causes: Sequence[Found], fit: Fit) -> str:
-    """What does not fit, where it shows most, and what that means."""
+    """What does not fit, where it shows most, and what that means: a cause is stated only if nothing else is left beside it."""
     surest = causes[0]
     log, phase = _where(surest.cause, fit)
-    also = ', '.join(dict.fromkeys(one.words for one in causes[1:3] if one.words != surest.words))
-    flaw = surest.cause.flaw
-    why = f'The parameter plant.{flaw} does not explain it' if flaw else 'The plant has no parameter for it'
-    return (f'the logs do not fit this plant: {surest.words} ({surest.coefficient:.3g} {surest.cause.unit}, '
-            f'{surest.sure:.0f} standard deviations from none), most in {log}{f", phase {phase}" if phase else ""}. '
-            f'{why}{f"; {also} would show so as well" if also else ""}')
+    seen = (f'{surest.words} ({surest.coefficient:.3g} {surest.cause.unit}, {surest.sure:.0f} standard deviations from none), '
+            f'most in {log}{f", phase {phase}" if phase else ""}')
+    also = ' or '.join(list(dict.fromkeys(one.words for one in causes[1:] if one.words != surest.words))[:2])
+    most = max(SURE, WORTH_A_TRY * surest.sure)
+    tried = ', '.join(f'plant.{one.flaw}' for one in causes if one.flaw and one.sure >= most)
+    if not surest.flaw and surest.rest < most:
+        return f'the logs do not fit this plant: {seen}. The plant has no parameter for it'
+    return (f'the logs do not fit this plant, and the cause is none that it has: it is most as if {seen}'
+            f'{f", then as if {also}" if also else ""}. '
+            f'{f"{tried}: tried, and no explanation" if tried else "None of these explains it alone"}')
 
 
 def _where(cause: Cause, fit: Fit) -> tuple[str, str]:
-    """The log and its phase that say most of a cause."""
+    """The log and its phase that say most of a cause: where what it acts on is there."""
     weight: dict[tuple[str, str], float] = {}
     turning = [np.zeros(len(log), dtype=bool) for log in fit.problem.logs]
     for piece in fit.pieces:
         turning[piece.log][piece.rows] = True
     for log, signals, turns in zip(fit.problem.logs, _signals(fit), turning):
-        follows = cause.follows(signals) * turns
+        follows = cause.follows(signals).reshape(len(log), -1)
+        slides, phases = signals.sliding_m_s * (log.wheels_apart == 0.0), log.phase
+        there = turns * {'road': slides, 'r1_m': slides, 'motor': log.motor_pwm}.get(cause.acts, np.ones(len(log)))
         if cause.acts in ('brake', 'c31_per_s', DELAY):
-            follows = follows * (signals.torque_Nm > 0.0)
-        if cause.acts == 'road':
-            follows = follows * (log.wheels_apart == 0.0)
-        for phase in dict.fromkeys(log.phase):
-            weight[log.name, str(phase)] = float(np.sum(follows[log.phase == phase]**2) * log.period_s)
+            there *= signals.torque_Nm
+            phases = phases[np.maximum.accumulate(np.where(log.brake_pwm > 0.0, np.arange(len(log)), 0))]  # that it is of
+        for phase in dict.fromkeys(phases):
+            weight[log.name, str(phase)] = float(np.sum((follows * there[:, None])[phases == phase]**2) * log.period_s)
     return max(weight, key=lambda place: weight[place])
