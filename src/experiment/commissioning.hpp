@@ -10,7 +10,8 @@
 
 namespace abs_hil::experiment {
 
-enum class Answer : std::uint8_t { yes, no, none };  ///< none: the input has ended, or a signal came
+/// A person's answer. None: the input has ended, or a signal came.
+enum class Answer : std::uint8_t { yes, no, none };
 
 /// The dialog with the person at the rig.
 class Dialog {
