@@ -25,7 +25,7 @@ says 'not obtained: memory locked (mlockall)'
 says 'rtprio 98'
 ! grep -q ': Success' "$scratch/err" || fail 'a reason is an errno read too late'
 says '/etc/security/limits.d/'
-says "setcap cap_sys_nice,cap_ipc_lock+ep $scratch/abs_hil"
+says "setcap cap_sys_nice,cap_ipc_lock+ep \"$scratch/abs_hil\""
 [ ! -e "$scratch/require.csv" ] || fail 'a file was opened although real time was required and not to be had'
 
 echo '-- prefer: runs, says so once and loudly, and in the summary'
