@@ -11,6 +11,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 import urllib.request
 
 from live import check, drive_for, enter_private_network
@@ -18,10 +19,19 @@ from scope import BIN_S, Served, Viewer, cycles_of, outside
 
 SIGNALS = ['omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N',
            'wakeup_latency_ns', 'zeta_N', 'tyre_slip', 'tyre_force_N']
-MOST_OF_A_CORE = 0.15
+MOST_OF_A_CORE = 2.5  # times work_s(): a slow computer needs more for all that it does
 JUMP_N = 15.0
 TRIES = 3
 TYRE_B, TYRE_C = 28.0, 1.68  # of the plant paper-table1
+
+
+def work_s():
+    """Processor time of a fixed piece of work in Python."""
+    def once():
+        before_s = time.process_time()
+        sum(n * n for n in range(1_000_000))
+        return time.process_time() - before_s
+    return min(once() for _ in range(5))
 
 
 async def with_a_viewer(program, server, folder, tries=TRIES):
@@ -47,7 +57,8 @@ async def with_a_viewer(program, server, folder, tries=TRIES):
         wrong = outside(viewer.envelope(number), cycles, SIGNALS[:-2])
         check(not wrong, f'each of {len(cycles)} cycles lies within the envelopes', len(wrong), wrong[:3])
         length_s = cycles[-1]['time_s']
-        check(used_s < MOST_OF_A_CORE * length_s, f'{used_s:.2f} s of the processor in {length_s:.1f} s, one viewer')
+        part = used_s / length_s / work_s()
+        check(part < MOST_OF_A_CORE, f'{used_s:.2f} s of the processor in {length_s:.1f} s, one viewer: {part:.2f} times work_s()')
 
         jump = next(c['cycle'] for b, c in zip(cycles, cycles[1:]) if b['theta_N'] > JUMP_N >= c['theta_N'])
         caught = next(reply for reply in viewer.replies if reply['kind'] == 'caught')
@@ -118,7 +129,7 @@ async def for_a_while(program, server, folder, seconds):
         check(await run.wait() == 0, 'the long run completes')
         grown_kB, used = server.memory_kB() - memory_kB, (server.cpu_s() - cpu_s) / (seconds - min(20, seconds / 3))
         check(grown_kB < 4000, f'memory grew by {grown_kB} kB of {memory_kB} kB in {seconds} s')
-        check(used < MOST_OF_A_CORE, f'{100 * used:.1f} % of a core for one viewer')
+        check(used < MOST_OF_A_CORE * work_s(), f'{100 * used:.1f} % of a core for one viewer')
         check(viewer.dropped == 0, 'nothing left out', viewer.dropped)
 
 
