@@ -17,8 +17,8 @@ CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] i
 #: columns that hold texts
 TEXTS = ('phase', 'phase_name')
 MOST_SHOWN = 40
-#: times of a run count from its start, and none lasts 30 years
-LAST_S = 1e9
+#: the latest time of a row: some other program's may count from 1970
+LAST_S = 2e9
 
 
 @dataclass

@@ -46,7 +46,7 @@ class SafeAtEnd {
 
 }  // namespace
 
-std::string words(const driver::IoResult& result) {
+std::string reason_and_error(const driver::IoResult& result) {
   const std::string error = driver::error_text(result);
   return result.reason == rig::Reason::none ? error : std::string(rig::description(result.reason)) + ": " + error;
 }
@@ -83,7 +83,7 @@ CommissioningResult Commissioning::run() {
   }
   const driver::IoResult result = driver_.deactivate();
   if (!result.ok()) {
-    dialog_.tell("the safe state may not have reached the board: " + words(result));
+    dialog_.tell("the safe state may not have reached the board: " + reason_and_error(result));
     return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
@@ -92,7 +92,7 @@ CommissioningResult Commissioning::run() {
 bool Commissioning::read(rig::Measurement& measurement) {
   const driver::IoResult result = driver_.read(clock_.now_ns(), measurement);
   if (!result.ok()) {
-    dialog_.tell("FAILED: cannot read the board: " + words(result));
+    dialog_.tell("FAILED: cannot read the board: " + reason_and_error(result));
   } else if (measurement.trip_flags != 0) {
     dialog_.tell(formatted("FAILED: the board's interlocks have tripped, flags 0x%x (bit 0x2: supply voltage)",
                            measurement.trip_flags));
@@ -178,7 +178,7 @@ bool Commissioning::activate_and_rest() {
     throw;
   }
   guard_.end(rests.ok());
-  if (!rests.ok()) dialog_.tell("FAILED: the board's outputs are not off: " + words(rests));
+  if (!rests.ok()) dialog_.tell("FAILED: the board's outputs are not off: " + reason_and_error(rests));
   return rests.ok();
 }
 
@@ -220,7 +220,7 @@ bool Commissioning::drive(const rig::Command& command, std::int64_t end_ns) {
     if (!read(now)) return false;
     if (clock_.now_ns() >= end_ns) break;
     if (const driver::IoResult result = driver_.write(command); !result.ok()) {
-      dialog_.tell("FAILED: cannot write to the board: " + words(result));
+      dialog_.tell("FAILED: cannot write to the board: " + reason_and_error(result));
       return false;
     }
   }
@@ -238,7 +238,7 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   if (active && ended.ok()) ended = driver_.rest();
   guard_.end(ended.ok());
   if (good && !ended.ok()) {
-    dialog_.tell("FAILED: cannot end the pulse: " + words(ended));
+    dialog_.tell("FAILED: cannot end the pulse: " + reason_and_error(ended));
     good = false;
   }
   if (!good || !read_fresh(now)) return false;
@@ -356,7 +356,7 @@ bool Commissioning::measure_outputs() {
   const driver::IoResult ended = driver_.deactivate();
   output_times_.release_ms = static_cast<double>(clock_.now_ns() - ordered_ns) / rig::ns_per_ms;
   guard_.end(ended.ok());
-  if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + words(ended));
+  if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + reason_and_error(ended));
   return driven && ended.ok();
 }
 

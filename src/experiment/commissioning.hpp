@@ -63,7 +63,7 @@ struct CommissioningOptions {
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
 
 /// An error as a run names it: the backend's own reason, if it has one, and the error.
-[[nodiscard]] std::string words(const driver::IoResult& result);
+[[nodiscard]] std::string reason_and_error(const driver::IoResult& result);
 
 /// The first steps with a rig. Each needs the person's consent: read the board, turn the wheels by hand, a small drive
 /// pulse, the cable pulled if the board watches it, a small brake pulse. A guard stands by whenever an output is on.

@@ -28,7 +28,7 @@ bool Commissioning::drive_until_silent(Travel& before) {
     if (const driver::IoResult io =
             result.ok() ? driver_.write({.motor_duty = options_.drive_duty, .motor_enable = true}) : result;
         !io.ok()) {
-      dialog_.tell("FAILED: " + words(io));
+      dialog_.tell("FAILED: " + reason_and_error(io));
       return false;
     }
     if (now.time_ns - mark.time_ns < window_ns) continue;

@@ -190,7 +190,7 @@ std::string make_safe(const config::Settings& settings) try {
   }
   // Says why the board cannot be opened.
   if (result.reason == rig::Reason::none) driver::make_safe_state_writer(settings.driver)->prepare();
-  return experiment::words(result);
+  return experiment::reason_and_error(result);
 } catch (const driver::Unavailable& error) {
   return error.what();
 }

@@ -16,7 +16,7 @@ namespace {
 
 /// Most frames that one cycle reads. An answer has 4.
 constexpr int most_frames_in_a_cycle = 64;
-/// STATUS and OUTPUTS come with every tenth answer. Some may be lost, and the run goes on for as long.
+/// STATUS and OUTPUTS come with every tenth answer; four of them in a row may be lost.
 constexpr int most_answers_without = 50;
 /// Largest difference between the node's clock and ours over one interval. The node may answer at any time within the
 /// timeout.

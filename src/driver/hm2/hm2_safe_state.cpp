@@ -15,7 +15,7 @@ namespace abs_hil::driver::hm2 {
 namespace {
 
 constexpr std::int64_t answer_ns = 5'000'000;
-/// After so many looks in a row without an answer the board may come back with another firmware.
+/// A board that answers again after so many silent looks in a row may have come back with another firmware.
 constexpr int silent_looks_most = 3;
 
 /// Bases and strides that all firmware known to us has. A board whose answers are lost must get its zeros too.
@@ -99,10 +99,12 @@ IoResult Hm2SafeState::look(std::int64_t wait_ns) noexcept {
   const std::size_t where = packet.read(space::hostmot2, direction_, ports_);
   std::array<std::uint8_t, 4 * most_ports> answer{};
   if (!ask(*link_, packet, answer, number_, wait_ns, 1)) {
-    if (++silent_looks_ >= silent_looks_most) known_ = false;
+    ++silent_looks_;
     return {IoError::no_answer, direction_, 0, rig::Reason::hm2_silent};
   }
-  silent_looks_ = 0;
+  if (std::exchange(silent_looks_, 0) >= silent_looks_most && std::exchange(known_, false)) {
+    return {IoError::no_answer, direction_, 0, rig::Reason::hm2_silent};
+  }
   for (unsigned port = 0; port < ports_; ++port) {
     if (word32(answer, where + std::size_t{4} * port) != 0) return {IoError::read_back_mismatch, direction_};
   }
@@ -117,7 +119,8 @@ IoResult Hm2SafeState::make_safe() noexcept {
   if (const int error = link_->send(zeros_.bytes()); error != 0) {
     return {IoError::disconnected, direction_, error, rig::Reason::hm2_silent};
   }
-  return look(answer_ns);
+  const IoResult seen = look(answer_ns);
+  return known_ ? seen : make_safe();  // of a board that came back, what it shows has to be found first
 }
 
 IoResult Hm2SafeState::verify_safe() noexcept {

@@ -39,7 +39,7 @@ class Hm2SafeState final : public SafeStateWriter {
   std::unique_ptr<Link> link_{};
   bool known_{false};  ///< its descriptors have been read
   bool tried_{false};  ///< to identify it
-  int silent_looks_{0};
+  int silent_looks_{0};  ///< in a row
   Reopening again_{};
   std::uint32_t number_{0};
   std::uint16_t direction_{0};
