@@ -8,10 +8,10 @@ import csv
 import io
 import math
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 import urllib.request
 
 from live import check, drive_for, enter_private_network
@@ -19,19 +19,17 @@ from scope import BIN_S, Served, Viewer, cycles_of, outside
 
 SIGNALS = ['omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N',
            'wakeup_latency_ns', 'zeta_N', 'tyre_slip', 'tyre_force_N']
-MOST_OF_A_CORE = 2.5  # times work_s(): a slow computer needs more for all that it does
+MOST_OF_A_RUN = 2.6
 JUMP_N = 15.0
 TRIES = 3
 TYRE_B, TYRE_C = 28.0, 1.68  # of the plant paper-table1
 
 
-def work_s():
-    """Processor time of a fixed piece of work in Python."""
-    def once():
-        before_s = time.process_time()
-        sum(n * n for n in range(1_000_000))
-        return time.process_time() - before_s
-    return min(once() for _ in range(5))
+def run_s():
+    """Processor time of the runs that have ended. Their cycles wake a process 1,000 times a second, as their messages do
+    the server: a slow computer needs more for both."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 async def with_a_viewer(program, server, folder, tries=TRIES):
@@ -39,7 +37,7 @@ async def with_a_viewer(program, server, folder, tries=TRIES):
     log, csv_file = folder / f'{tries}.lcmlog', folder / f'{tries}.csv'
     async with Viewer(server.socket, SIGNALS) as viewer:
         await viewer.ask(do='trigger', on='level', signal='theta_N', level=JUMP_N, edge='fall')
-        before_s = server.cpu_s()
+        before_s, run_before_s = server.cpu_s(), run_s()
         run = await asyncio.create_subprocess_exec(
             program, '--experiment', 'friction-jump', '--log', log, '--csv', csv_file, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL)
@@ -57,8 +55,8 @@ async def with_a_viewer(program, server, folder, tries=TRIES):
         wrong = outside(viewer.envelope(number), cycles, SIGNALS[:-2])
         check(not wrong, f'each of {len(cycles)} cycles lies within the envelopes', len(wrong), wrong[:3])
         length_s = cycles[-1]['time_s']
-        part = used_s / length_s / work_s()
-        check(part < MOST_OF_A_CORE, f'{used_s:.2f} s of the processor in {length_s:.1f} s, one viewer: {part:.2f} times work_s()')
+        part = used_s / (run_s() - run_before_s)
+        check(part < MOST_OF_A_RUN, f'{used_s:.2f} s of the processor in {length_s:.1f} s, one viewer: {part:.2f} of the run')
 
         jump = next(c['cycle'] for b, c in zip(cycles, cycles[1:]) if b['theta_N'] > JUMP_N >= c['theta_N'])
         caught = next(reply for reply in viewer.replies if reply['kind'] == 'caught')
@@ -70,8 +68,9 @@ async def with_a_viewer(program, server, folder, tries=TRIES):
         await viewer.until(lambda: viewer.rows, 'the cycles around the jump')
         time_s, cycle, theta_N = viewer.rows[0]
         expected = [c for c in cycles if time_s[0] <= c['time_s'] <= time_s[-1]]
-        check(len(time_s) >= 199 and list(cycle) == [c['cycle'] for c in expected]
-              and list(theta_N) == [c['theta_N'] for c in expected], 'each cycle around the jump')
+        within = {c['cycle'] for c in cycles if abs(c['time_s'] - caught['time_s']) < 0.099}  # some are late
+        check(len(within) > 100 and within <= set(cycle) and list(cycle) == [c['cycle'] for c in expected]
+              and list(theta_N) == [c['theta_N'] for c in expected], 'each cycle around the jump', len(within), len(cycle))
         names = {facts['names'][name] for name in ('experiment', 'controller', 'backend')}
         check(names == {'friction-jump', 'adaptive', 'sim'}, 'names of the run', names)
         check([m['phase'] for m in facts['marks']][:2] == ['idle', 'accelerate'], 'marks of phases', facts['marks'])
@@ -122,6 +121,7 @@ def downloaded(server, number, csv_file):
 async def for_a_while(program, server, folder, seconds):
     """Memory and processor over a long run."""
     async with Viewer(server.socket, SIGNALS[:4]) as viewer:
+        run_before_s = run_s()
         run = await asyncio.create_subprocess_exec(program, *drive_for(folder, seconds),
                                                    stdout=subprocess.DEVNULL)
         await asyncio.sleep(min(20, seconds / 3))
@@ -129,7 +129,7 @@ async def for_a_while(program, server, folder, seconds):
         check(await run.wait() == 0, 'the long run completes')
         grown_kB, used = server.memory_kB() - memory_kB, (server.cpu_s() - cpu_s) / (seconds - min(20, seconds / 3))
         check(grown_kB < 4000, f'memory grew by {grown_kB} kB of {memory_kB} kB in {seconds} s')
-        check(used < MOST_OF_A_CORE * work_s(), f'{100 * used:.1f} % of a core for one viewer')
+        check(used < MOST_OF_A_RUN * (run_s() - run_before_s) / seconds, f'{100 * used:.1f} % of a core for one viewer')
         check(viewer.dropped == 0, 'nothing left out', viewer.dropped)
 
 

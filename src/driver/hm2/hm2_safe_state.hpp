@@ -37,8 +37,8 @@ class Hm2SafeState final : public SafeStateWriter {
   Hm2Options options_;
   OpenLink open_link_;
   std::unique_ptr<Link> link_{};
-  bool known_{false};  ///< its descriptors have been read
-  bool tried_{false};  ///< to identify it
+  bool known_{false};    ///< its descriptors have been read
+  bool tried_{false};    ///< to identify it
   int silent_looks_{0};  ///< in a row
   Reopening again_{};
   std::uint32_t number_{0};
