@@ -6,7 +6,6 @@
 
 enum { SPACE_HOSTMOT2, SPACE_CHIP, SPACE_EEPROM, SPACE_FLASH, SPACE_TIMERS, SPACE_UNUSED, SPACE_CONTROL, SPACE_BOARD };
 enum { PORT_OUTPUT, PORT_DDR, PORT_ALTERNATE, PORT_OPEN_DRAIN, PORT_INVERT };
-enum { PARSE_ERROR = 1, MEMORY_ERROR = 2, WRITE_ERROR = 4 };
 enum { CONTROL_PARSE = 1, CONTROL_MEMORY = 2, CONTROL_WRITE = 3, CONTROL_RX = 4, CONTROL_TX = 7 };
 
 #define PIN_MASK 0x1FFFFU
@@ -16,6 +15,7 @@ enum { CONTROL_PARSE = 1, CONTROL_MEMORY = 2, CONTROL_WRITE = 3, CONTROL_RX = 4,
 #define WATCHDOG_OFF 0x80000000U
 #define FEED_MARK 0x5AU
 #define WRITE_NUMBER 0x14U
+#define MOST_AHEAD 1024U /* no host sends more datagrams in the watchdog's longest time */
 
 /* The page 0x400: the IDROM, in which the board's name stands at 3 and 4, then the modules at 16: tag, version, clock,
    instances | base, registers | registers of each instance. */
@@ -28,8 +28,8 @@ static uint32_t word16(const uint8_t *bytes) { return bytes[0] | (uint32_t)bytes
 
 static uint32_t word32(const uint8_t *bytes) { return word16(bytes) | word16(bytes + 2) << 16; }
 
-static void count_error(struct node_core *node, unsigned which, unsigned bit) {
-  node->control[0] |= (uint16_t)bit;
+static void count_error(struct node_core *node, unsigned which) {
+  node->control[0] |= (uint16_t)(1U << (which - 1));
   ++node->control[which];
 }
 
@@ -67,11 +67,11 @@ static void feed(struct node_core *node) {
 static void write_status(struct node_core *node, uint32_t value) {
   if (value != 0 || !node->latched) return;
   if (node->fed_since_bite || node->pwm_value[0] != 0 || node->pwm_value[1] != 0) {
-    count_error(node, CONTROL_WRITE, WRITE_ERROR);
+    node->refused = CONTROL_WRITE;
     return;
   }
   node->latched = false;
-  node->number_known = false;
+  node->number_known = false; /* unless this datagram has a number */
 }
 
 void node_poll(struct node_core *node, uint32_t now_us) {
@@ -182,7 +182,7 @@ static uint32_t read_register(const struct node_core *node, uint32_t address) {
 
 static void write_port(struct node_core *node, uint32_t which, uint32_t i, uint32_t value) {
   if ((which == PORT_DDR || which == PORT_OPEN_DRAIN) && node->latched && value != 0) {
-    count_error(node, CONTROL_WRITE, WRITE_ERROR);
+    node->refused = CONTROL_WRITE;
   } else {
     node->port[which][i] = value & PIN_MASK;
   }
@@ -260,10 +260,11 @@ static void write_bytes(struct node_core *node, uint32_t space, uint32_t address
   for (; count > 0; --count, ++address, ++data) {
     if (space == SPACE_TIMERS && address >= 2 && address < sizeof node->timers) {
       node->timers[address] = *data;
+      if (address >= WRITE_NUMBER) node->numbered = true;
     } else if (space == SPACE_CONTROL && address < 2) {
       node->control[0] = 0; /* a write clears the errors */
     } else {
-      count_error(node, CONTROL_WRITE, WRITE_ERROR);
+      node->refused = CONTROL_WRITE;
     }
   }
 }
@@ -298,39 +299,8 @@ static bool take_command(const struct node_core *node, const uint8_t *bytes, siz
   *at += data_bytes;
   const bool in_use = command->space != SPACE_CHIP && command->space != SPACE_FLASH && command->space != SPACE_UNUSED;
   const uint32_t unit = command->info || command->space != SPACE_HOSTMOT2 ? 2 : 4;
-  command->known = in_use && command->unit == unit && !(command->info && command->write);
-  return true;
-}
-
-/* True if every command is whole, the answer fits, and a write number in it is newer than the last. */
-static bool acceptable(struct node_core *node, const uint8_t *bytes, size_t length) {
-  size_t answer = 0;
-  size_t at = 0;
-  struct command command;
-  const uint8_t *number = NULL;
-  while (at < length) {
-    if (!take_command(node, bytes, length, &at, &command)) {
-      count_error(node, CONTROL_PARSE, PARSE_ERROR);
-      return false;
-    }
-    if (!command.write) answer += (size_t)command.unit * command.units;
-    if (command.write && command.known && command.space == SPACE_TIMERS && command.address == WRITE_NUMBER &&
-        command.units == 2) {
-      number = command.data;
-    }
-  }
-  if (answer > NODE_MOST_BYTES) {
-    count_error(node, CONTROL_PARSE, PARSE_ERROR);
-    return false;
-  }
-  if (number == NULL) return true;
-  const uint32_t step = word32(number) - node->write_number;
-  if (permitted(node) && node->number_known && (step == 0 || step >= 0x80000000U)) {
-    count_error(node, CONTROL_WRITE, WRITE_ERROR);
-    return false;
-  }
-  node->write_number += step;
-  node->number_known = true;
+  const bool odd = command->space == SPACE_HOSTMOT2 && command->address % 4 != 0;
+  command->known = in_use && command->unit == unit && !(command->write && (command->info || odd));
   return true;
 }
 
@@ -358,29 +328,62 @@ static void obey_read(const struct node_core *node, const struct command *comman
   }
 }
 
-size_t node_datagram(struct node_core *node, uint32_t now_us, const uint8_t *datagram, size_t length, uint8_t *answer) {
+static void obey(struct node_core *node, const struct command *command, uint8_t *answer) {
+  uint32_t address = command->address;
+  if (!command->known) {
+    if (command->write) node->refused = CONTROL_MEMORY;
+    count_error(node, CONTROL_MEMORY);
+  }
+  for (uint32_t unit = 0; unit < command->units; ++unit) {
+    if (!command->write) {
+      obey_read(node, command, address, answer + (size_t)unit * command->unit);
+    } else if (command->known) {
+      obey_write(node, command, address, unit);
+    }
+    if (command->increment) address = (address + command->unit) & 0xFFFFU;
+  }
+  if (!command->info) node->pointer[command->space] = (uint16_t)address;
+}
+
+/* Obeys until a command is refused, and returns the length of the answer. */
+static size_t obey_all(struct node_core *node, const uint8_t *bytes, size_t length, uint8_t *answer) {
   size_t at = 0;
   size_t answered = 0;
   struct command command;
+  while (at < length && node->refused == 0) {
+    const bool whole = take_command(node, bytes, length, &at, &command);
+    const size_t more = !whole || command.write ? 0 : (size_t)command.unit * command.units;
+    if (!whole || answered + more > NODE_MOST_BYTES) {
+      node->refused = CONTROL_PARSE;
+    } else {
+      obey(node, &command, answer + answered);
+      answered += more;
+    }
+  }
+  return answered;
+}
+
+/* True if outputs were permitted before a datagram whose write number, however it is written, is not one of the next. */
+static bool is_stale(const struct node_core *before, const struct node_core *node) {
+  const uint32_t step = word32(node->timers + WRITE_NUMBER) - word32(before->timers + WRITE_NUMBER);
+  return node->numbered && permitted(before) && before->number_known && step - 1U >= MOST_AHEAD;
+}
+
+size_t node_datagram(struct node_core *node, uint32_t now_us, const uint8_t *datagram, size_t length, uint8_t *answer) {
   node_poll(node, now_us);
   ++node->control[CONTROL_RX];
   ++node->control[CONTROL_RX + 1];
-  if (!acceptable(node, datagram, length)) return 0;
-  while (at < length) {
-    (void)take_command(node, datagram, length, &at, &command);
-    if (!command.known) count_error(node, CONTROL_MEMORY, MEMORY_ERROR);
-    uint32_t address = command.address;
-    for (uint32_t unit = 0; unit < command.units; ++unit) {
-      if (!command.write) {
-        obey_read(node, &command, address, answer + answered);
-        answered += command.unit;
-      } else if (command.known) {
-        obey_write(node, &command, address, unit);
-      }
-      if (command.increment) address = (address + command.unit) & 0xFFFFU;
-    }
-    if (!command.info) node->pointer[command.space] = (uint16_t)address;
+  const struct node_core before = *node;
+  const size_t answered = obey_all(node, datagram, length, answer);
+  if (is_stale(&before, node)) node->refused = CONTROL_WRITE;
+  if (node->refused != 0) {
+    const unsigned which = node->refused;
+    *node = before; /* outputs follow the registers only after this function */
+    count_error(node, which);
+    return 0;
   }
+  if (node->numbered) node->number_known = true;
+  node->numbered = false;
   if (answered > 0) {
     ++node->control[CONTROL_TX];
     ++node->control[CONTROL_TX + 1];

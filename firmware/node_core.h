@@ -7,8 +7,8 @@
        only while both PWM values are 0, and if the watchdog has not been fed since the bite. A host that has fed it
        must first switch the watchdog off, or let it bite now.
      - The watchdog's time is at most NODE_LONGEST_US, and without an armed watchdog no pin is driven.
-     - A datagram acts as a whole or not at all. While outputs are permitted, one with a write number that is not newer
-       than the last does not act.
+     - A datagram acts as a whole or, with no answer, not at all: if it breaks off, asks for too much, or a write in it is
+       refused. While outputs are permitted, one whose write number is not among the 1,024 after the last is refused.
      - A PWM output acts while it is high; the inversion, which the wiring of a 7I92 needs, is stored and does nothing. */
 #ifndef NODE_CORE_H
 #define NODE_CORE_H
@@ -42,9 +42,10 @@ struct node_core {
   uint32_t count[NODE_CHANNELS];    /* since the last clear, extended */
   uint32_t counted_us[NODE_CHANNELS];
   uint32_t watchdog_clocks, allowed_us, fed_us;
-  uint32_t write_number;
   bool armed, latched, fed_since_bite, number_known;
-  uint8_t timers[24];   /* space 4; the last 8 are scratch */
+  bool numbered;        /* the datagram at hand has written to the write number */
+  uint8_t refused;      /* the error count for the datagram at hand; 0: all of it acts */
+  uint8_t timers[24];   /* space 4; the last 4 are the write number */
   uint16_t control[16]; /* space 6, by words */
   uint16_t pointer[8];
 };

@@ -38,8 +38,8 @@ double ControlCommand::number(std::size_t n) const {
   const std::string& word = text(n);
   double value = 0.0;
   const auto [at, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || at != word.data() + word.size()) {
-    throw std::invalid_argument("\"" + word + "\" is not a number");
+  if (error != std::errc() || at != word.data() + word.size() || !std::isfinite(value)) {
+    throw std::invalid_argument("\"" + word + "\" is not a finite number");
   }
   return value;
 }
@@ -89,17 +89,26 @@ void ControlFifo::take(const Obey& obey) {
   }
 }
 
-void open_for_writing(std::ofstream& stream, const std::string& file) {
-  stream.close();
+void OutputFile::begin(const std::string& file) {
+  end();
   if (file == "off") return;
-  stream.open(file);
-  if (!stream) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
+  open(name_ = file);
+  if (!is_open()) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
+}
+
+void OutputFile::end() {
+  if (!is_open()) return;
+  close();
+  if (good()) return;
+  any_lost_ = true;
+  fmt::print(stderr, "abs_rig_emulator: \"{}\" is incomplete: a write failed; is the disk full?\n", name_);
+  clear();
 }
 
 BoardTime::BoardTime(bool lock_step, const std::string& truth_file, bool with_trip_flags) : lock_step_(lock_step) {
   restart();
   if (truth_file.empty()) return;
-  open_for_writing(stream_, truth_file);
+  stream_.begin(truth_file);
   stream_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty"
           << (with_trip_flags ? ",trip_flags\n" : "\n");
 }

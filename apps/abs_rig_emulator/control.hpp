@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,7 +36,7 @@ class ControlCommand {
   [[nodiscard]] const std::string& name() const { return words_.at(0); }
   /// The nth argument, from 1.
   [[nodiscard]] const std::string& text(std::size_t n) const { return words_.at(n); }
-  /// The nth argument as a number. Throws std::invalid_argument if it is not one.
+  /// The nth argument as a finite number. Throws std::invalid_argument if it is not one.
   [[nodiscard]] double number(std::size_t n) const;
   /// True if the nth argument is the first of these words, false if it is the second. Throws std::invalid_argument if
   /// it is neither.
@@ -103,9 +105,14 @@ template <class Board>
 constexpr ControlRow<Board> overspeed_row{"overspeed", "latches the overspeed interlock until the wheels stop",
                                           [](Board& b, const ControlCommand&) { b.model().trip_overspeed(); }};
 template <class Board>
-constexpr ControlRow<Board> turn_row{
-    "turn upper|lower REVOLUTIONS", "a wheel is turned by hand",
-    [](Board& b, const ControlCommand& c) { b.model().turn_by_hand(c.first_of(1, "upper", "lower"), c.number(2)); }};
+constexpr ControlRow<Board> turn_row{"turn upper|lower REVOLUTIONS", "a wheel is turned by hand",
+                                     [](Board& b, const ControlCommand& c) {
+                                       constexpr double most = 100.0;
+                                       const bool upper = c.first_of(1, "upper", "lower");
+                                       if (std::abs(c.number(2)) > most)
+                                         throw std::invalid_argument(c.text(2) + ": give -100 to 100 revolutions");
+                                       b.model().turn_by_hand(upper, c.number(2));
+                                     }};
 
 /// Prints the events that a board has logged, and writes the changes of its outputs to an open file.
 /// @param start_ns  what the board's time begins at
@@ -128,8 +135,21 @@ class ControlFifo {
   std::string pending_{};
 };
 
-/// Opens an output file of the emulator; "off" closes it. Throws std::runtime_error.
-void open_for_writing(std::ofstream& stream, const std::string& file);
+/// An output file of the emulator. What a full disk loses is told when it is closed.
+class OutputFile : public std::ofstream {
+ public:
+  OutputFile() = default;
+  ~OutputFile() override { end(); }
+  /// "off" closes it. Throws std::runtime_error.
+  void begin(const std::string& file);
+  /// True if any file has lost what was written.
+  [[nodiscard]] static bool any_lost() noexcept { return any_lost_; }
+
+ private:
+  void end();
+  inline static bool any_lost_{false};
+  std::string name_{};
+};
 
 /// A board's time, and the CSV of true values that it does not show to the host, one row per ms of that time.
 class BoardTime {
@@ -166,7 +186,7 @@ class BoardTime {
 
   bool lock_step_;
   std::int64_t started_ns_{0};
-  std::ofstream stream_{};
+  OutputFile stream_{};
   std::int64_t next_ns_{0};
 };
 

@@ -23,7 +23,7 @@ void wait_for(std::int64_t duration_ns) {
 
 EmulatedCard::EmulatedCard(const EmulatorOptions& options)
     : model_(options.card), faulty_(model_, options.seed), time_(options.lock_step, options.truth_file, true) {
-  if (!options.traffic_file.empty()) open_for_writing(traffic_, options.traffic_file);
+  if (!options.traffic_file.empty()) traffic_.begin(options.traffic_file);
 }
 
 void EmulatedCard::record(char direction, std::uint64_t offset, std::uint32_t value) {
@@ -107,9 +107,9 @@ std::span<const ControlRow<EmulatedCard>> EmulatedCard::rows() {
       overspeed_row<Card>,
       turn_row<Card>,
       {"record FILE|off", "register accesses: R or W, offset, value",
-       [](Card& card, const Command& c) { open_for_writing(card.traffic_, c.text(1)); }},
+       [](Card& card, const Command& c) { card.traffic_.begin(c.text(1)); }},
       {"changes FILE|off", "each change of a PWM's width: when, ns as in \"widths\", drive, brake",
-       [](Card& card, const Command& c) { open_for_writing(card.changes_, c.text(1)); }},
+       [](Card& card, const Command& c) { card.changes_.begin(c.text(1)); }},
       {.usage = "widths",
        .meaning = "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in "
                   "lock-step of the card's time",

@@ -53,8 +53,8 @@ class EmulatedCard final : public FileHandler {
   bool present_{true};
   bool permission_denied_{false};
   BoardTime time_;
-  std::ofstream traffic_{};
-  std::ofstream changes_{};
+  OutputFile traffic_{};
+  OutputFile changes_{};
   std::pair<std::uint32_t, std::uint32_t> last_widths_{};
 };
 

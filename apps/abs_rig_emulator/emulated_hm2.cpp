@@ -63,6 +63,14 @@ emulator::Hm2Options with_address(const Hm2EmulatorOptions& options, std::uint32
 std::unique_ptr<emulator::UdpBoard> make_board(const Hm2EmulatorOptions& options, std::uint32_t& ip,
                                                std::uint16_t& port) {
   const emulator::Hm2Options board = with_address(options, ip, port);
+  const int most = options.is_node ? 0 : 33;
+  if (board.enable_pin < -1 || board.enable_pin > most) {
+    throw std::invalid_argument(fmt::format("--enable-line {}: {}; -1: none", board.enable_pin,
+                                            options.is_node ? "the node has output 0 alone" : "give an I/O, 0 to 33"));
+  }
+  if (options.is_node && (!board.lie.empty() || board.active_high_stage)) {
+    throw std::invalid_argument("--wrong-board and --active-high are of the 7I92T, not of the node; give --hm2");
+  }
   if (options.is_node) return std::make_unique<emulator::NodeBoard>(board);
   return std::make_unique<emulator::Hm2Board>(board);
 }
@@ -149,8 +157,10 @@ std::string EmulatedHm2::status() const {
   constexpr int microseconds = 6;
   return fmt::format("{}, {}, pins {}, cable {}, writes {}", state_text(*board_, microseconds),
                      board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
-                     board_->drives_pins() ? "driven" : "pulled high", link_.plugged() ? "in" : "out",
-                     board_->writes());
+                     board_->drives_pins() ? "driven"
+                     : options_.is_node    ? "pulled low"
+                                           : "pulled high",
+                     link_.plugged() ? "in" : "out", board_->writes());
 }
 
 void EmulatedHm2::set_talker(const std::string& what) {
@@ -181,7 +191,7 @@ std::span<const ControlRow<EmulatedHm2>> EmulatedHm2::rows() {
       turn_row<Hm2>,
       {"changes FILE|off",
        "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
-       [](Hm2& hm2, const Command& c) { open_for_writing(hm2.changes_, c.text(1)); }},
+       [](Hm2& hm2, const Command& c) { hm2.changes_.begin(c.text(1)); }},
       {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
   }};
   return all;

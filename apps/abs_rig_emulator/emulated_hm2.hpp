@@ -63,7 +63,7 @@ class EmulatedHm2 {
   emulator::Hm2Link link_;
   driver::FileDescriptor socket_{-1};
   BoardTime time_;
-  std::ofstream changes_{};
+  OutputFile changes_{};
   Talker talker_{Talker::off};
   std::int64_t talks_ns_{0};
 };

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "cli/command_line.hpp"
+#include "cli/standard_output.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -337,7 +338,12 @@ int run(int argc, char** argv) {
   Arguments arguments;
   add_options(parser, arguments);
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
-  return serve(arguments);
+  if (!arguments.use_usb && arguments.pci_root.empty() && arguments.can_interface.empty() &&
+      arguments.hm2.address.empty() && arguments.node_address.empty()) {
+    throw std::invalid_argument("--pci-root, --can, --hm2 and --node need a value that is not empty");
+  }
+  const int status = serve(arguments);
+  return status == 0 && program::OutputFile::any_lost() ? 1 : status;
 }
 
 }  // namespace
@@ -347,7 +353,7 @@ int main(int argc, char** argv) {
   action.sa_handler = [](int) { stop_requested = true; };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
   try {
-    return run(argc, argv);
+    return cli::with_stdout("abs_rig_emulator", run(argc, argv));
   } catch (const config::ConfigError& error) {
     fmt::print(stderr, "abs_rig_emulator: {}\n", error.what());
     return 2;

@@ -80,14 +80,19 @@ void NodeBoard::note_outputs(const std::string& why) {
   log_.note(time_ns(), outputs(), why, never ? -1 : time_ns() - 1000 * since_us);
 }
 
-void NodeBoard::obey_lock_step(std::span<const std::uint8_t> datagram) {
+std::vector<std::uint8_t> NodeBoard::obey_lock_step(std::span<const std::uint8_t> datagram) {
+  constexpr std::ptrdiff_t head_bytes = 4;
+  std::vector<std::uint8_t> rest(datagram.begin(), datagram.end());
   for_each_command(datagram, [&](unsigned word, std::size_t data_at, std::size_t /*answered*/) {
     if (word != advances_time) return;
     std::int64_t wanted_ns = 0;
     std::memcpy(&wanted_ns, datagram.data() + data_at, time_bytes);
     constexpr std::int64_t longest_ns = 10'000'000'000;
     advance_to(std::clamp(wanted_ns, time_ns(), time_ns() + longest_ns));
+    const auto data = rest.end() - static_cast<std::ptrdiff_t>(datagram.size() - data_at);
+    rest.erase(data - head_bytes, data + static_cast<std::ptrdiff_t>(time_bytes));
   });
+  return rest;
 }
 
 void NodeBoard::answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
@@ -99,11 +104,13 @@ void NodeBoard::answer_lock_step(std::span<const std::uint8_t> datagram, std::sp
 }
 
 std::vector<std::uint8_t> NodeBoard::answer(std::span<const std::uint8_t> datagram) {
-  if (options_.lock_step) obey_lock_step(datagram);
+  // The core knows no space 5, and would refuse a datagram with a write to it.
+  const std::vector<std::uint8_t> for_core =
+      options_.lock_step ? obey_lock_step(datagram) : std::vector(datagram.begin(), datagram.end());
   look();
   const bool was_latched = core_.latched;
   std::vector<std::uint8_t> reply(NODE_MOST_BYTES);
-  reply.resize(node_datagram(&core_, now_us(), datagram.data(), datagram.size(), reply.data()));
+  reply.resize(node_datagram(&core_, now_us(), for_core.data(), for_core.size(), reply.data()));
   if (options_.lock_step && !reply.empty()) answer_lock_step(datagram, reply);
   bool writes = false;
   for_each_command(datagram, [&writes](unsigned word, std::size_t /*data_at*/, std::size_t /*answered*/) {

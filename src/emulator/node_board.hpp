@@ -29,8 +29,8 @@ class NodeBoard final : public UdpBoard {
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override;
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { look(); }
   [[nodiscard]] std::uint32_t now_us() const noexcept { return static_cast<std::uint32_t>(time_ns() / 1000); }
-  /// Advances the time as the commands of space 5 say.
-  void obey_lock_step(std::span<const std::uint8_t> datagram);
+  /// Advances the time as the commands of space 5 say, and returns the others.
+  std::vector<std::uint8_t> obey_lock_step(std::span<const std::uint8_t> datagram);
   /// Puts what space 5 answers in place of the core's zeros.
   void answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const;
   /// What the chip's loop does: counters, then the watchdog.

@@ -8,7 +8,7 @@ import unittest
 
 import hm2_run_test
 from can_emulator import skip_unless_possible
-from emulator_process import EmulatorProcess
+from emulator_process import EMULATOR, EmulatorProcess
 from program import PROGRAM
 
 
@@ -24,6 +24,22 @@ class NodeRun(hm2_run_test.Hm2Run):
     BOARD = Node
     #: Its counters have no bit for a quadrature error.
     FAULTS = [fault for fault in hm2_run_test.Hm2Run.FAULTS if not fault[0].startswith('quadrature-error')]
+
+    def test_the_emulator_refuses_what_cannot_be(self):
+        address = f'127.0.0.1:{hm2_run_test.free_port()}'
+        for words, status, why in (
+                (('--node', ''), 2, '--node need a value'), (('--node', address, '--enable-line', 99), 2, 'output 0 alone'),
+                (('--node', address, '--wrong-board', 'no-pwm'), 2, 'give --hm2'),
+                (('--node', address, '--command', 'turn upper nan'), 2, 'not a finite number'),
+                (('--node', address, '--command', 'turn upper 1e300'), 2, '-100 to 100'),
+                (('--hm2', address, '--truth', '/dev/full'), 1, 'incomplete')):
+            with self.subTest(words):
+                run = subprocess.run(['timeout', '--preserve-status', '-s', 'INT', '2', EMULATOR, *map(str, words)],
+                                     capture_output=True, text=True)
+                self.assertEqual(run.returncode, status)
+                self.assertIn(why, run.stderr)
+                if status == 1:
+                    self.assertIn('pins pulled high', run.stdout)
 
     def test_a_bite_is_latched_until_the_next_activation(self):
         board = self.board()
