@@ -75,6 +75,7 @@ driver::FileDescriptor open_listener(const std::string& path) {
   const auto refuse = [&path](const std::string& why) {
     throw driver::Unavailable("guardian.socket = " + path + ": " + why);
   };
+  if (path.empty()) throw config::ConfigError("guardian.socket is empty; give the path of a socket");
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);

@@ -23,6 +23,12 @@ for file in share/abs_hil/guardian.toml lib/systemd/system/abs-guardian.service 
   lib/udev/rules.d/70-abs-hil.rules; do
   [ -f "usr/$file" ] || { echo "$file is not installed"; exit 1; }
 done
+# A driver that opens a socket of another family would find no board under the packaged guardian.
+families=$(grep -rhoE '::socket\([AP]F_[A-Z0-9]+' "$source"/src/driver "$source"/src/guardian | sed 's/.*F_/AF_/' | sort -u)
+for family in $families; do
+  grep -qE "^RestrictAddressFamilies=.*\b$family\b" usr/lib/systemd/system/abs-guardian.service ||
+    { echo "abs-guardian.service forbids the sockets of $family, which a driver opens"; exit 1; }
+done
 # The unit as systemd reads it; what it starts is the program that was just installed.
 if command -v systemd-analyze >/dev/null; then
   sed "s|^ExecStart=abs_guardian|ExecStart=$scratch/usr/bin/abs_guardian|; /^Documentation=/d" \

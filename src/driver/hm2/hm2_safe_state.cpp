@@ -89,6 +89,9 @@ bool Hm2SafeState::find_board() noexcept {
     Identifying link(*link_, seen.ok() ? nullptr : &zeros_, first ? monotonic_ns() + first_ns : INT64_MAX);
     identify(link);
     return true;
+  } catch (const NoSocket& error) {
+    socket_error_ = error.errno_value;
+    return false;
   } catch (...) {
     return false;  // the usual addresses serve until the board can be read
   }
@@ -113,8 +116,9 @@ IoResult Hm2SafeState::look(std::int64_t wait_ns) noexcept {
 
 IoResult Hm2SafeState::make_safe() noexcept {
   if (!known_ && (!again_.due() || !find_board())) {
-    const bool sent = link_ && link_->send(zeros_.bytes()) == 0;
-    return {sent ? IoError::no_answer : IoError::disconnected, direction_, 0, rig::Reason::hm2_silent};
+    const int error = link_ ? link_->send(zeros_.bytes()) : socket_error_;
+    const bool sent = link_ && error == 0;
+    return {sent ? IoError::no_answer : IoError::disconnected, direction_, error, rig::Reason::hm2_silent};
   }
   if (const int error = link_->send(zeros_.bytes()); error != 0) {
     return {IoError::disconnected, direction_, error, rig::Reason::hm2_silent};

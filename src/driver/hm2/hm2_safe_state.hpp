@@ -37,6 +37,7 @@ class Hm2SafeState final : public SafeStateWriter {
   Hm2Options options_;
   OpenLink open_link_;
   std::unique_ptr<Link> link_{};
+  int socket_error_{0};  ///< why there is no link
   bool known_{false};    ///< its descriptors have been read
   bool tried_{false};    ///< to identify it
   int silent_looks_{0};  ///< in a row

@@ -13,7 +13,6 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
 #include "rig/formatted_text.hpp"
@@ -68,10 +67,14 @@ void Packet::write_number(std::uint16_t address, std::uint32_t number) noexcept 
   put(number, 4);
 }
 
+NoSocket::NoSocket(int error)
+    : Unavailable(std::string("backend rig: no UDP socket to the hm2 board: ") + std::strerror(error)),
+      errno_value(error) {}
+
 UdpLink::UdpLink(const sockaddr_in& board) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
   // A connected socket takes datagrams of this address and port alone.
   if (socket_.get() < 0 || ::connect(socket_.get(), reinterpret_cast<const sockaddr*>(&board), sizeof board) != 0) {
-    throw Unavailable(std::string("backend rig: no UDP socket to the hm2 board: ") + std::strerror(errno));
+    throw NoSocket(errno);
   }
 }
 

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "abs_hil/driver/io_result.hpp"
 #include "driver/file_descriptor.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -90,10 +91,17 @@ class Link {
   virtual std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept = 0;
 };
 
+/// The system gives no socket.
+class NoSocket : public Unavailable {
+ public:
+  explicit NoSocket(int error);
+  int errno_value;
+};
+
 /// A UDP socket that takes datagrams of the board alone.
 class UdpLink final : public Link {
  public:
-  /// Throws Unavailable.
+  /// Throws NoSocket.
   explicit UdpLink(const sockaddr_in& board);
   int send(std::span<const std::uint8_t> bytes) noexcept override;
   std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override;

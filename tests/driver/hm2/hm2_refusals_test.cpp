@@ -188,6 +188,8 @@ TEST_CASE("A writer that has never been answered sends zeros to the usual addres
   hm2::Hm2SafeState late({}, own.opener());
   CHECK_THROWS_AS(late.prepare(), Unavailable);
   CHECK_FALSE(late.make_safe().ok());
+  hm2::Hm2SafeState forbidden({}, []() -> std::unique_ptr<hm2::Link> { throw hm2::NoSocket(EAFNOSUPPORT); });
+  CHECK_THAT(error_text(forbidden.make_safe()), Contains("Address family not supported"));
 }
 
 TEST_CASE("The safe-state writer reads the description of a board anew that was silent for three looks") {
