@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <type_traits>
 
@@ -28,7 +29,15 @@ bool is_integer(const Target& target) {
   return std::visit([](auto* to) { return std::is_integral_v<std::remove_pointer_t<decltype(to)>>; }, target);
 }
 
+/// A comparison with NaN is false, so CLI::Range takes it.
+std::string refuse_infinite(const std::string& text) {
+  double value = 0.0;
+  return CLI::detail::lexical_cast(text, value) && !std::isfinite(value) ? "Value " + text + " is not a finite number"
+                                                                         : std::string();
+}
+
 void limit_values(CLI::Option& option, const Option& row) {
+  if (std::holds_alternative<double*>(row.to)) option.check(refuse_infinite, "");
   const auto [least, most] = row.range;
   if (least < most) {
     option.check(std::holds_alternative<double*>(row.to) ? CLI::Range(least, most)

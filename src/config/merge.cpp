@@ -178,7 +178,11 @@ void fill(Settings& s, KeyTable& keys, const Sources& sources, const Files& file
   set("run.seed", sources.seed, "--seed");
   for (const std::string& assignment : sources.assignments) keys.set_text(assignment, "--set");
   set_all(sources.changes, keys);
-  for (const std::string& injection : sources.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
+  for (const std::string& injection : sources.injections) {
+    if (driver::parse_injections(injection).empty())
+      throw ConfigError("--inject is empty; give a fault, or leave it out");
+    s.inject += (s.inject.empty() ? "" : ",") + injection;
+  }
   if (sources.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
   if (s.on_rig()) complete_identity(s, keys);
   s.realtime.mode = realtime_mode(sources.realtime, s);

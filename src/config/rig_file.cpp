@@ -50,8 +50,9 @@ std::string rig_file(const Settings& settings, std::string_view name) {
   const KeyTable keys(copy);
   return fmt::format(
              "# The rig {0}. Replace the values by those of your rig; until then they are those of {1}.\n"
-             "#   abs_hil --plant {0}.toml                   simulates it\n"
-             "#   abs_hil --backend rig --model {0}.toml     tells the controllers what to believe about it\n"
+             "#   abs_hil --plant {0}.toml                         simulates it\n"
+             "#   abs_hil commission --set rig.identity={0}.toml   tries the rig out; each run needs both options:\n"
+             "#   abs_hil --backend rig --set rig.identity={0}.toml --model {0}.toml   limits, and what to believe\n"
              "description = \"the rig {0}\"\n\n[plant]\n"
              "# ---- read off the rig",
              name, settings.plant_name) +

@@ -5,6 +5,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/program/program.hpp"
+#include "cli/standard_output.hpp"
 #include "guardian/guardian_program.hpp"
 
 namespace abs_hil {
@@ -17,7 +18,7 @@ int program::run_guardian(int argc, char** argv, std::span<const driver::Backend
     return guardian::exit_usage;
   }
   const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first == "serve") return guardian::serve(argc, argv);
+  if (first == "serve") return cli::with_stdout("abs_guardian", guardian::serve(argc, argv));
   if (first == "--help" && argc == 2) {
     std::puts(
         "Usage: abs_guardian serve [--socket PATH] [--config FILE] [--set key=value]...\n\n"
@@ -26,7 +27,7 @@ int program::run_guardian(int argc, char** argv, std::span<const driver::Backend
         "time. "
         "`abs_guardian serve --help` names its options.\nWithout the service abs_hil starts a guardian for each run on "
         "a board; do not start that one by hand (docs/dead-man.md).");
-    return 0;
+    return cli::with_stdout("abs_guardian", 0);
   }
   if (argc != 1 || !guardian::started_by_a_run()) {
     std::fputs(

@@ -31,8 +31,10 @@ int init_rig(const config::Settings& settings, const std::string& name) {
   } catch (const files::FileError& error) {
     throw config::ConfigError(std::string("init-rig: ") + error.what());
   }
-  fmt::print("{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil --backend rig --model {0}\n",
-             file.string());
+  fmt::print(
+      "{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil commission --set rig.identity={0}, "
+      "abs_hil --backend rig --set rig.identity={0} --model {0}\n",
+      file.string());
   return exit_completed;
 }
 

@@ -79,6 +79,12 @@ int latency(const LatencyOptions& options) {
   RunRequest request;
   static_cast<config::Configuration&>(request) = config::merge(options.sources);
   config::Settings& s = request.settings;
+  constexpr double least_cycles = 10.0;
+  if (options.duration_s * s.control.rate_Hz < least_cycles) {
+    throw config::ConfigError(fmt::format("--duration {:g} s: give at least {:g} s, {:g} cycles at {:g} Hz",
+                                          options.duration_s, least_cycles / s.control.rate_Hz, least_cycles,
+                                          s.control.rate_Hz));
+  }
   const bool on_rig = s.on_rig();
   if (!on_rig) s.experiment.start_speed_rad_s = start_speed_rad_s;
   // Gaps in the simulation are what this command measures; they must not end it.

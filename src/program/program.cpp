@@ -1,13 +1,11 @@
 // From a command line to what it asks for, and from errors to exit statuses.
 #include "abs_hil/program/program.hpp"
 
-#include <poll.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -18,6 +16,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
+#include "cli/standard_output.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "interchange/foreign_controller.hpp"
@@ -83,18 +82,6 @@ int fail(int status, const std::exception& error) {
   return status;
 }
 
-/// Results that did not reach standard output are lost data. A reader or a terminal that has gone wanted no more.
-int with_stdout(int status) {
-  errno = 0;
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
-  const int why = errno;
-  pollfd output{STDOUT_FILENO, POLLOUT, 0};
-  if (::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0) return status;
-  fprintf(stderr, "abs_hil: cannot write to standard output%s%s\n", why != 0 ? ": " : "",
-          why != 0 ? std::strerror(why) : "");
-  return status == program::exit_completed ? program::exit_ended_early : status;
-}
-
 /// The command line is part of a run's record. A path that is no text would fail there, after the run.
 void refuse_odd_bytes(int argc, char** argv) {
   for (int n = 1; n < argc; ++n) {
@@ -131,7 +118,8 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   program::survive_closed_terminals();
   try {
     for (const driver::Backend& board : boards) driver::register_backend(board);
-    if (const std::optional<int> status = program::safe_at_once(argc, argv)) return with_stdout(*status);
+    if (const std::optional<int> status = program::safe_at_once(argc, argv))
+      return cli::with_stdout("abs_hil", *status);
   } catch (const std::exception& error) {
     return fail(program::exit_ended_early, error);
   }
@@ -141,7 +129,7 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
   // On a terminal a message takes the place of a line that shows progress; that is drawn again below it.
   spdlog::set_pattern(isatty(STDERR_FILENO) == 1 ? "\r\x1b[K%n: %^%l%$: %v" : "%n: %^%l%$: %v");
-  return with_stdout(checked(argc, argv, own));
+  return cli::with_stdout("abs_hil", checked(argc, argv, own));
 }
 
 }  // namespace abs_hil

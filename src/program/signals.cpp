@@ -42,8 +42,9 @@ bool ignored(int signal) noexcept {
 
 void survive_closed_terminals() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(fd, F_GETFD) < 0)
-      static_cast<void>(::open("/dev/null", O_RDWR));  // open() returns the lowest free descriptor
+    // open() returns the lowest free descriptor. Results that nobody takes are told as lost (cli::with_stdout).
+    const int mode = fd == STDOUT_FILENO ? O_RDONLY : O_RDWR;
+    if (::fcntl(fd, F_GETFD) < 0) static_cast<void>(::open("/dev/null", mode));
   }
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported by the failed write, like a full disk

@@ -141,6 +141,13 @@ class Outputs(ProgramTest):
                                         timeout=60, cwd=self.folder)
                 self.assertIn(result.returncode, (1, 3), result.stderr)
                 self.assertRegex(result.stderr, 'No space left|cannot write to standard output')
+        for program in 'abs_guardian', 'abs_rig_emulator':
+            with open('/dev/full', 'w') as full:
+                path = pathlib.Path(PROGRAM).with_name(program)
+                self.assertEqual(subprocess.run([path, '--help'], stdout=full, stderr=subprocess.DEVNULL).returncode, 1)
+        closed = subprocess.run(['sh', '-c', '"$0" list >&-', PROGRAM], stderr=subprocess.PIPE, text=True)
+        self.assertEqual(closed.returncode, 1)
+        self.assertIn('cannot write to standard output', closed.stderr)
         # A reader that wanted no more is no failure.
         with subprocess.Popen([PROGRAM, 'list'], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as reader:
             reader.stdout.close()

@@ -140,6 +140,14 @@ TEST_CASE("a range includes both ends and no more") {
   CHECK(error_of(answer_of(real, {"--wait", "60"})) == "none");
   CHECK(error_of(answer_of(real, {"--wait", "0.09"})) == "--wait: Value 0.09 not in range 0.100000 to 60.000000");
   CHECK(error_of(answer_of(real, {"--wait", "60.1"})) == "--wait: Value 60.1 not in range 0.100000 to 60.000000");
+  for (const char* text : {"nan", "NAN", "inf", "1e999"}) {
+    for (const cli::Range range : {cli::Range{}, real.range}) {
+      CAPTURE(text, range.most);
+      const cli::Option option{.names = "--wait", .to = &wait, .help = "", .range = range};
+      CHECK(error_of(answer_of(option, {"--wait", text})) != "none");
+    }
+  }
+  CHECK(error_of(answer_of(real, {"--wait", "nan"})) == "--wait: Value nan is not a finite number");
 }
 
 TEST_CASE("a row may list its values") {

@@ -40,5 +40,6 @@ TEST_CASE("a rig's file says of each parameter of a rig where to read it off") {
     CHECK_FALSE(key.on_rig.empty());
     CHECK_THAT(text, Contains("# on the rig: " + std::string(key.on_rig) + "\n" + key.name.substr(6) + " = "));
   }
+  CHECK_THAT(text, Contains("--backend rig --set rig.identity=ours.toml --model ours.toml "));
   CHECK_THAT(text, Contains("# upper wheel radius; [0.01, 1] m\n"));
 }

@@ -206,17 +206,18 @@ void InjectingDriver::note_effect(bool differs) noexcept {
   if (differs && first_effect_ns_ < 0) first_effect_ns_ = now_ns_;
 }
 
-ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
+ActiveFault InjectingDriver::fault_of(InjectionSignal signal, InjectionSignal or_of) const noexcept {
   // The fault that began last acts. The kind `ok` ends earlier faults.
   std::int64_t latest_ns = -1;
   ActiveFault fault{};
   for (const Planned& planned : planned_) {
-    if (planned.injection.signal != signal || planned.entered_ns < 0) continue;
+    const InjectionSignal given = planned.injection.signal;
+    if ((given != signal && given != or_of) || planned.entered_ns < 0) continue;
     const std::int64_t begins_ns = planned.entered_ns + ns_of(planned.injection.delay_s);
     const bool over = now_ns_ - begins_ns >= ns_of(std::min(planned.injection.duration_s, longest_run_s));
     if (now_ns_ < begins_ns || over || begins_ns < latest_ns) continue;
     latest_ns = begins_ns;
-    fault = {planned.injection.kind, planned.injection.parameter};
+    fault = {planned.injection.kind, planned.injection.parameter, given};
   }
   return fault;
 }
@@ -279,21 +280,29 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
 }
 
 void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
-  const ActiveFault both = fault_of(InjectionSignal::encoders);
-  ActiveFault upper = fault_of(InjectionSignal::encoder_upper);
-  ActiveFault lower = fault_of(InjectionSignal::encoder_lower);
+  ActiveFault upper = fault_of(InjectionSignal::encoder_upper, InjectionSignal::encoders);
+  ActiveFault lower = fault_of(InjectionSignal::encoder_lower, InjectionSignal::encoders);
   const rig::Measurement before = delivered_;
-  std::int32_t upper_travel = upper_.travel(measurement.upper_counts);
-  std::int32_t lower_travel = lower_.travel(measurement.lower_counts);
-  if (both.kind == InjectionKind::wrong) {
-    std::swap(upper_travel, lower_travel);
-  } else if (both.kind != InjectionKind::ok) {
-    upper = lower = both;
+  const rig::Measurement sound = measurement;
+  const std::int32_t of_upper = upper_.travel(measurement.upper_counts);
+  const std::int32_t of_lower = lower_.travel(measurement.lower_counts);
+  std::int32_t upper_travel = of_upper;
+  std::int32_t lower_travel = of_lower;
+  if (upper.swaps()) {
+    upper = {};
+    upper_travel = of_lower;
+    measurement.upper_edge_age_ns = sound.lower_edge_age_ns;
+    if (sound.ideal_speeds) measurement.ideal_speeds->omega1_rad_s = sound.ideal_speeds->omega2_rad_s;
+  }
+  if (lower.swaps()) {
+    lower = {};
+    lower_travel = of_upper;
+    measurement.lower_edge_age_ns = sound.upper_edge_age_ns;
+    if (sound.ideal_speeds) measurement.ideal_speeds->omega2_rad_s = sound.ideal_speeds->omega1_rad_s;
   }
   measurement.upper_counts = upper_.pass(upper_travel, upper, now_ns_, random_);
   measurement.lower_counts = lower_.pass(lower_travel, lower, now_ns_, random_);
   // A faulty encoder's edges come at other times, which nobody stamps.
-  if (both.kind == InjectionKind::wrong) std::swap(measurement.upper_edge_age_ns, measurement.lower_edge_age_ns);
   if (upper.kind != InjectionKind::ok) measurement.upper_edge_age_ns = rig::no_edge_age;
   if (lower.kind != InjectionKind::ok) measurement.lower_edge_age_ns = rig::no_edge_age;
   if (!measurement.ideal_speeds) return;
@@ -303,10 +312,6 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
     const double shown = rig::counts_between(from, to);
     return travelled != 0 && dt_s > 0.0 ? true_rad_s * shown / travelled : (shown == 0.0 ? 0.0 : true_rad_s);
   };
-  if (both.kind == InjectionKind::wrong) {
-    std::swap(measurement.ideal_speeds->omega1_rad_s, measurement.ideal_speeds->omega2_rad_s);
-    return;
-  }
   if (upper.kind != InjectionKind::ok) {
     measurement.ideal_speeds->omega1_rad_s =
         speed(before.upper_counts, measurement.upper_counts, upper_travel, measurement.ideal_speeds->omega1_rad_s);

@@ -29,6 +29,11 @@ namespace abs_hil::driver {
 struct ActiveFault {
   InjectionKind kind{InjectionKind::ok};
   double parameter{0.0};
+  InjectionSignal signal{};  ///< for which it was given
+  /// True if the encoder shows the other wheel's counts.
+  [[nodiscard]] bool swaps() const noexcept {
+    return kind == InjectionKind::wrong && signal == InjectionSignal::encoders;
+  }
 };
 
 /// Queue of values that are delivered late. If it overflows, the oldest value is lost.
@@ -170,7 +175,9 @@ class InjectingDriver final : public RigDriver {
   IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
   IoResult do_rest() noexcept override { return inner_->rest(); }
 
-  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept;
+  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept { return fault_of(signal, signal); }
+  /// Of faults given for either signal.
+  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal, InjectionSignal or_of) const noexcept;
   void note_effect(bool differs) noexcept;
   void fail_encoders(rig::Measurement& measurement) noexcept;
   void fail_numbers(rig::Measurement& measurement) noexcept;

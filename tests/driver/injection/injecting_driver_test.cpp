@@ -259,6 +259,22 @@ TEST_CASE("the later fault acts, and ok heals") {
   CHECK(bench.measurement.supply_V == 29.0);
 }
 
+TEST_CASE("a fault of both encoders and one of either end each other") {
+  Bench healed("any@encoders:stuck,any@encoder_upper:ok+3ms,any@encoder_lower:wrong+3ms");
+  healed.cycles(2);
+  CHECK(healed.measurement.upper_counts == 100);
+  healed.cycles(5);
+  CHECK(healed.measurement.upper_counts == 100 + 5 * 100);
+  CHECK(healed.measurement.lower_counts == 120 - 5 * 120);
+  Bench later("any@encoder_upper:wrong,any@encoders:ok+3ms");
+  later.cycles(7);
+  CHECK(later.measurement.upper_counts == 100 - 1 * 100 + 5 * 100);
+  Bench half_swapped("any@encoders:wrong,any@encoder_lower:ok+3ms");
+  half_swapped.cycles(7);
+  CHECK(half_swapped.measurement.upper_counts == 100 + 6 * 120);
+  CHECK(half_swapped.measurement.lower_counts == 120 + 1 * 100 + 5 * 120);
+}
+
 TEST_CASE("a repeated delay begins with the current value") {
   Bench supply("any@supply:delayed=2ms+2ms~3ms,any@supply:delayed=2ms+10ms");
   supply.cycles(10);
