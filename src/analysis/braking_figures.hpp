@@ -4,9 +4,10 @@
 // the recursion that computes them cycle by cycle.
 //
 // With t from the start of braking, tau the torque reference, judged cycles those of phase brake with v_x > 3 m/s:
-//   rms          sqrt(mean(e^2)) over the judged cycles with t > 0.3 s; e = slip - slip_ref, or theta_est / theta - 1
+//   rms          sqrt(mean(e^2)) over the judged cycles from t = 0.3 s on (with that at 0.3 s if its t rounds up);
+//                e = slip - slip_ref, or theta_est / theta - 1
 //   settling     last entry into the band: |slip - slip_ref| <= 0.02, |theta_est - theta| <= 0.05 theta
-//   variation    sum of |tau_k - tau_(k-1)| over phase brake
+//   variation    sum of |tau_k - tau_(k-1)| over phase brake, where both are known
 //   locked       sum of the judged cycles' durations with slip > 0.95
 
 #include <array>
@@ -82,14 +83,14 @@ inline constexpr std::array<Figure, 16> figures{{
     {"stop_distance_m", &Metrics::stop_distance_m, "stop distance", "m", 2, Better::less, true, 3,
      "trapezoid of v_x over the ticks between", lacking::stop},
     {"slip_rms", &Metrics::slip_rms, "slip RMS error", "", 4, Better::less, true, 4,
-     "of slip − slip_ref, later than 0.3 s after brake start and v_x > 3 m/s",
+     "of slip − slip_ref, from the cycle at 0.3 s after brake start, or the next, on and v_x > 3 m/s",
      "no braking above {judged:.3g} m/s later than {rms_start} s after its start"},
     {"slip_reached_s", &Metrics::slip_reached_s, "slip reached", "s", 3, Better::less, false, 5,
      "time after which slip is within 0.02 of its reference for the first time, while v_x > 3 m/s",
      "the slip never came within {slip_band} of the wanted one above {judged:.3g} m/s"},
     {"slip_settling_s", &Metrics::slip_settling_s, "slip settling", "s", 3, Better::less, true, 6,
      "time after which slip stays within 0.02 of its reference while v_x > 3 m/s",
-     "the slip left its band, {slip_band}, above {judged:.3g} m/s"},
+     "the slip was not within {slip_band} of the wanted one in the last cycle above {judged:.3g} m/s"},
     {"slip_overshoot", &Metrics::slip_overshoot, "slip overshoot", "", 4, Better::less, true, 10,
      "largest excess of slip over slip_ref while v_x > 3 m/s, at least 0", ""},
     {"slip_largest", &Metrics::slip_largest, "largest slip", "", 4, Better::less, false, 11,
@@ -99,18 +100,20 @@ inline constexpr std::array<Figure, 16> figures{{
     {"torque_total_variation_Nm", &Metrics::torque_total_variation_Nm, "torque variation", "N m", 1, Better::less, true,
      9, "sum of the absolute steps of the requested torque, over phase `brake`: measures chatter", ""},
     {"theta_final_N", &Metrics::theta_final_N, "theta at 3 m/s", "N", 2, Better::neither, false, 7,
-     "the estimate at 3 m/s: the last one while v_x > 3 m/s, not the one at the end of the run",
+     "the estimate at 3 m/s: that of the last cycle with v_x > 3 m/s, not the one at the end of the run",
      "no estimate at {judged:.3g} m/s; the run ended at {speed:.3g} m/s"},
     {"theta_settling_s", &Metrics::theta_settling_s, "theta settling", "s", 3, Better::less, true, 8,
      "time after which the estimate stays within 5 % of the truth while v_x > 3 m/s",
-     "no estimate within {theta_per_cent} % of the true theta above {judged:.3g} m/s"},
+     "no estimate within {theta_per_cent} % of a known theta in the last cycle above {judged:.3g} m/s"},
     {"theta_error_rms", &Metrics::theta_error_rms, "theta RMS error", "", 4, Better::less, true, 14,
-     "of estimate / truth − 1, over the samples of slip_rms", ""},
+     "of estimate / truth − 1, over the samples of slip_rms",
+     "no braking above {judged:.3g} m/s later than {rms_start} s after its start, or a cycle of it lacks an estimate "
+     "or a known theta"},
     {"theta_error_final", &Metrics::theta_error_final, "theta error at end", "", 4, Better::nearer_zero, true, 13,
      "theta_final_N / true theta at that time − 1",
      "no estimate of a known theta at {judged:.3g} m/s; the run ended at {speed:.3g} m/s"},
     {"theta_error_max_N", &Metrics::theta_error_max_N, "largest theta error", "N", 2, Better::less, false, 15,
-     "largest abs(θ̂ − θ), later than 0.3 s after brake start and v_x > 3 m/s", ""},
+     "largest abs(θ̂ − θ), over the samples of slip_rms", ""},
     {"final_speed_m_s", &Metrics::final_speed_m_s, "final speed", "m/s", 3, Better::neither, false, 0,
      "v_x of the last record", ""},
 }};
@@ -211,9 +214,10 @@ void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condi
   // A wheel below a twentieth of the car's speed can be steered no better than a locked one.
   constexpr double locked_slip = 0.95;
 
-  const S variation_Nm = torque_total_variation_Nm + rig::magnitude(S(sample.torque_ref_Nm - last_torque_Nm_));
-  torque_total_variation_Nm =
-      rig::select(braking, rig::select(rig::is_nan(last_torque_Nm_), S(0.0), variation_Nm), torque_total_variation_Nm);
+  const S step_Nm = rig::magnitude(S(sample.torque_ref_Nm - last_torque_Nm_));
+  const auto begins = braking && rig::is_nan(torque_total_variation_Nm) && !rig::is_nan(sample.torque_ref_Nm);
+  const S before_Nm = rig::select(begins, S(0.0), torque_total_variation_Nm);
+  torque_total_variation_Nm = rig::select(braking && !rig::is_nan(step_Nm), S(before_Nm + step_Nm), before_Nm);
   last_torque_Nm_ = rig::select(braking, sample.torque_ref_Nm, last_torque_Nm_);
   // Slower than this the slip dynamics stiffen as 1 / v_x and the paper calls the performance "no longer relevant".
   const auto judged = braking && sample.v_x_m_s > least_judged_speed_m_s;

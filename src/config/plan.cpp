@@ -166,6 +166,21 @@ double passed_in(const experiment::PhasePlan& phase, EndKind kind) {
   return least;
 }
 
+/// The wheel speed that has been reached at least when a condition holds.
+double speed_at(const experiment::EndCondition& end, double r2_m) {
+  double least = 0.0;
+  if (end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above) least = end.value;
+  if (end.kind == EndKind::car_speed_above) least = end.value / r2_m;
+  for (const experiment::EndCondition& part : end.parts) least = std::max(least, speed_at(part, r2_m));
+  return least;
+}
+
+double speed_in(const experiment::PhasePlan& phase, double r2_m) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const experiment::EndCondition& end : phase.ends_on) least = std::min(least, speed_at(end, r2_m));
+  return least;
+}
+
 }  // namespace
 
 double value_of(const Script& script, const Number& number, const KeyTable& keys) {
@@ -247,30 +262,23 @@ std::vector<std::string> beyond_limits(const Plan& plan, const Settings& s) {
       s.plant.ideal_actuator ? 1e9 : rig::brake_torque_at(s.model.brake, s.gate.brake_duty_max);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
-    const auto compare = [&](double wanted, double most, std::string_view what, std::string_view unit) {
+    const auto compare = [&](double wanted, double most, std::string_view what, std::string_view unit,
+                             std::string_view limit) {
       if (wanted > most) {
-        problems.push_back(
-            fmt::format("phase \"{}\": {} {:.6g}{} is more than {:.6g}{}", phase.name, what, wanted, unit, most, unit));
+        problems.push_back(fmt::format("phase \"{}\": {} {:.6g}{} is more than the {:.6g}{} that gate.{} allows",
+                                       phase.name, what, wanted, unit, most, unit, limit));
       }
     };
-    compare(highest(phase.motor_profile, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "");
+    compare(highest(phase.motor_profile, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "", "motor_duty_max");
     compare(highest(phase.brake_profile, phase.brake_torque_Nm) * (phase.brake == BrakeAction::torque ? 1.0 : 0.0),
-            most_torque_Nm, "brake torque", " N m");
+            most_torque_Nm, "brake torque", " N m", "brake_duty_max");
     compare(highest(phase.brake_profile, phase.brake_duty) * (phase.brake == BrakeAction::duty ? 1.0 : 0.0),
-            s.gate.brake_duty_max, "brake duty", "");
-    for (const experiment::EndCondition& end : phase.ends_on) {
-      if (end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above) {
-        compare(end.value, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
-      }
-      if (end.kind == EndKind::car_speed_above) {
-        compare(end.value / s.model.wheels.r2_m, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
-      }
-    }
+            s.gate.brake_duty_max, "brake duty", "", "brake_duty_max");
   }
   return problems;
 }
 
-std::vector<std::string> certain_faults(const Plan& plan) {
+std::vector<std::string> certain_faults(const Plan& plan, const Settings& s) {
   std::vector<std::string> problems;
   const auto compare = [&](const std::string& what, double least, std::string_view limit, double most,
                            std::string_view unit) {
@@ -284,6 +292,8 @@ std::vector<std::string> certain_faults(const Plan& plan) {
   for (const experiment::PhasePlan& phase : plan.phases) {
     const double lasts_s = passed_in(phase, EndKind::duration);
     compare(fmt::format("phase \"{}\" lasts", phase.name), lasts_s, "its at_most_s", phase.time_limit_s, "s");
+    compare(fmt::format("phase \"{}\" waits for a wheel speed of", phase.name), speed_in(phase, s.model.wheels.r2_m),
+            "limits.wheel_speed_rad_s (gate.overspeed_rad_s)", s.gate.overspeed_rad_s, "rad/s");
     time_s += lasts_s;
     distance_m += passed_in(phase, EndKind::distance);
   }

@@ -36,12 +36,12 @@ void apply(const Script& script, config::Settings& settings);
 /// standstill or below a car speed of at most `end_speed_m_s`.
 [[nodiscard]] bool means_to_stop(const Plan& plan, double end_speed_m_s);
 
-/// Describes where the script exceeds the limits of rig, gate or board under these settings; empty: nowhere. A run
-/// stays within the limits.
+/// Describes where the script exceeds the duties and torques of rig, gate or board under these settings; empty:
+/// nowhere. A run stays within them.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& settings);
 
-/// Describes which limits of time and distance every run of the plan must exceed, so that it ends as a fault; empty:
-/// none.
-[[nodiscard]] std::vector<std::string> certain_faults(const Plan& plan);
+/// Describes which limits of time, distance and speed every run of the plan must exceed, so that it ends as a fault;
+/// empty: none.
+[[nodiscard]] std::vector<std::string> certain_faults(const Plan& plan, const config::Settings& settings);
 
 }  // namespace abs_hil::config

@@ -183,6 +183,7 @@ int run(const RunRequest& request) {
   const run::Prepared prepared(s, *request.script);
   for (const std::string& problem : config::beyond_limits(prepared.plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
+  for (const std::string& problem : config::certain_faults(prepared.plan, s)) spdlog::warn("{}", problem);
   ForeignRun foreign(s.on_rig());
   run::Run run(prepared, {.real_time = !virtual_time, .overruns = overruns_of(s, virtual_time)});
   require_resources(run, lease != nullptr);

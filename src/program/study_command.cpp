@@ -136,6 +136,7 @@ int run_study(const StudyCommand& command) {
   fmt::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
              tally.runs, duration_text(spent_s), spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0,
              tally.faults, tally.refused);
+  if (!tally.damaged.empty()) spdlog::warn("damaged chunks were computed anew: {}", study::list_of(tally.damaged));
   if (tally.refused > 0) {
     spdlog::warn("{} runs could not begin; the column `reason` of the results says why", tally.refused);
   }
@@ -174,6 +175,10 @@ int show_status(const std::string& path) {
       fmt::print("all chunks are there; put them together: abs_hil study merge {}\n", path);
     } else {
       fmt::print("missing chunks: {}\n", study::list_of(missing));
+      const std::vector<std::uint64_t> damaged = study::damaged_of(missing, folder);
+      if (!damaged.empty()) {
+        fmt::print("of these damaged: {}; the study computes them anew when it goes on\n", study::list_of(damaged));
+      }
     }
   }
   fmt::print("{}", slurm_jobs(path));

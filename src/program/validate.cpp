@@ -35,7 +35,8 @@ int validate(const config::Sources& sources) {
   }
   const config::Plan plan = config::plan(script, s);
   std::vector<std::string> problems = config::beyond_limits(plan, s);
-  std::ranges::move(config::certain_faults(plan), std::back_inserter(problems));
+  for (std::string& problem : problems) problem += "; give at most that in this phase, or raise the limit";
+  std::ranges::move(config::certain_faults(plan, s), std::back_inserter(problems));
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
   // Find errors that appear only when a run is made.

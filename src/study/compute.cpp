@@ -148,14 +148,22 @@ std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard
   if (folder.complete()) return missing;
   const std::vector<bool> finished = folder.finished();
   for (std::uint64_t number = 0; number < finished.size(); ++number) {
-    if (!finished[number] && shard.has(number)) missing.push_back(number);
+    if (shard.has(number) && !(finished[number] && folder.is_whole(number))) missing.push_back(number);
   }
   return missing;
+}
+
+std::vector<std::uint64_t> damaged_of(const std::vector<std::uint64_t>& missing, const StudyFolder& folder) {
+  std::vector<std::uint64_t> damaged;
+  std::ranges::copy_if(missing, std::back_inserter(damaged),
+                       [finished = folder.finished()](std::uint64_t number) { return finished[number]; });
+  return damaged;
 }
 
 Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard, std::size_t threads,
               const Progress& progress) {
   const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
+  std::vector<std::uint64_t> damaged = damaged_of(chunks, folder);
   std::uint64_t all = 0;
   for (const std::uint64_t chunk : chunks) all += study.runs_in(chunk);
   const auto tell = [&progress, all](std::uint64_t done) {
@@ -167,7 +175,9 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
   for (std::size_t at = 0; at < chunks.size(); at += at_once) {
     computation.run(chunks.data() + at, std::min<std::size_t>(at_once, chunks.size() - at));
   }
-  return computation.tally();
+  Tally tally = computation.tally();
+  tally.damaged = std::move(damaged);
+  return tally;
 }
 
 }  // namespace abs_hil::study

@@ -29,14 +29,19 @@ struct Shard {
   [[nodiscard]] bool has(std::uint64_t chunk) const noexcept { return chunk % of == number - 1; }
 };
 
-/// The chunks of a shard that have no file yet, in order.
+/// The chunks of a shard whose file is missing or damaged, in order. Reads the files.
 [[nodiscard]] std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard& shard);
+
+/// Those of the missing chunks whose file is there: damaged ones.
+[[nodiscard]] std::vector<std::uint64_t> damaged_of(const std::vector<std::uint64_t>& missing,
+                                                    const StudyFolder& folder);
 
 /// What became of runs.
 struct Tally {
   std::uint64_t runs{0};
-  std::uint64_t faults{0};   ///< ended early
-  std::uint64_t refused{0};  ///< could not begin, for their combination of values
+  std::uint64_t faults{0};               ///< ended early
+  std::uint64_t refused{0};              ///< could not begin, for their combination of values
+  std::vector<std::uint64_t> damaged{};  ///< chunks that were there, damaged, and are computed anew
 };
 
 /// Tells how many of all runs that have to be computed are done. Called from several threads, after each run, and once

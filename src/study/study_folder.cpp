@@ -184,6 +184,13 @@ std::vector<bool> StudyFolder::finished() const {
   return finished;
 }
 
+bool StudyFolder::is_whole(std::uint64_t number) const try {
+  static_cast<void>(checked_chunk(number, part(number)));
+  return true;
+} catch (const std::runtime_error&) {
+  return false;
+}
+
 void StudyFolder::write_chunk(std::uint64_t number, std::string_view rows) const try {
   files::write_result(part(number), "chunk of a study", gzip_member(rows, note_of(number)));
 } catch (const std::runtime_error&) {
@@ -194,7 +201,8 @@ void StudyFolder::write_chunk(std::uint64_t number, std::string_view rows) const
 std::string StudyFolder::checked_chunk(std::uint64_t number, const fs::path& file) const {
   std::string bytes = content_of(file);
   const auto refuse = [&file](const std::string& why) {
-    throw std::runtime_error(fmt::format("{}: {}; remove this file and run the study again", file.string(), why));
+    throw std::runtime_error(
+        fmt::format("{}: {}; run the study again, which computes this chunk anew", file.string(), why));
   };
   GzipMember member;
   try {

@@ -63,6 +63,8 @@ class StudyFolder {
   [[nodiscard]] bool complete() const;
   /// By chunk: true if its file is there.
   [[nodiscard]] std::vector<bool> finished() const;
+  /// True if the file of a chunk is there and has every row of it. Reads the file.
+  [[nodiscard]] bool is_whole(std::uint64_t number) const;
   /// Writes the file of a chunk. @param rows  its rows of CSV, in order
   void write_chunk(std::uint64_t number, std::string_view rows) const;
   /// Puts the chunks together that lie in this and the other folders, and then removes the parts of this one. Each

@@ -147,7 +147,7 @@ TEST_CASE("each missing figure says why, and no other") {
   for (const MissingFigure& figure : missing_figures(nothing.metrics(), 0.3)) {
     CHECK(figure.why == "the run did not brake");
   }
-  CHECK(names(nothing.metrics()).size() == 9);
+  CHECK(names(nothing.metrics()).size() == 10);
   CHECK(names(brake(on_target, exact)).empty());
   const Metrics moving = brake_to(0.36, rig::Phase::stopped);
   CHECK_THAT(why(moving, "stop_time_s"), Catch::Matchers::Contains("still moved at 0.36 m/s"));
@@ -156,6 +156,12 @@ TEST_CASE("each missing figure says why, and no other") {
   CHECK_THAT(why(unsettled, "slip_reached_s"), Catch::Matchers::Contains("never came within 0.02"));
   CHECK_THAT(why(unsettled, "slip_settling_s"), Catch::Matchers::Contains("0.02"));
   CHECK_THAT(why(unsettled, "theta_settling_s"), Catch::Matchers::Contains("5 %"));
+  // The estimates are right until a phase without a controller begins.
+  const Metrics ended = brake(on_target, [](double since_s) { return since_s < 1.0 ? 20.0 : std::nan(""); });
+  CHECK(names(ended) ==
+        std::vector<std::string_view>{"theta_final_N", "theta_settling_s", "theta_error_rms", "theta_error_final"});
+  CHECK_THAT(why(ended, "theta_settling_s"), Catch::Matchers::Contains("in the last cycle above 3 m/s"));
+  CHECK_THAT(why(ended, "theta_error_rms"), Catch::Matchers::Contains("a cycle of it lacks an estimate"));
   const Metrics silent = brake(on_target, [](double) { return std::nan(""); });
   CHECK_THAT(why(silent, "theta_final_N"), Catch::Matchers::Contains("no estimate"));
 }
@@ -178,6 +184,26 @@ TEST_CASE("a braking that ends above 3 m/s has no estimate of theta there") {
 TEST_CASE("total variation sums the steps of the torque reference") {
   const Metrics m = brake(on_target, exact);
   CHECK_THAT(m.torque_total_variation_Nm, WithinAbs(3000 * 0.5, 1e-6));
+}
+
+TEST_CASE("a gap of the torque reference adds no step and loses none, and without any value there is no variation") {
+  const auto variation = [](const std::vector<double>& torques_Nm) {
+    RunMetrics metrics(r2_m, 0.5);
+    rig::CycleRecord record;
+    record.phase = rig::Phase::brake;
+    record.truth.speeds = {0.0, 100.0};
+    for (const double torque_Nm : torques_Nm) {
+      record.time_s += 1e-3;
+      record.control.brake_torque_ref_Nm = torque_Nm;
+      metrics.consume(record, 0.0);
+    }
+    return metrics.metrics().torque_total_variation_Nm;
+  };
+  const double gap = std::nan("");
+  CHECK(variation({1.0, 3.0, gap, gap, 7.0, 6.5}) == 2.5);
+  CHECK(variation({gap, 1.0, 3.0, gap}) == 2.0);
+  CHECK(variation({2.0}) == 0.0);
+  CHECK(std::isnan(variation({gap, gap})));
 }
 
 TEST_CASE("overshoot is the largest excess of slip over its reference above 3 m/s") {

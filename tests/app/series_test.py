@@ -154,7 +154,7 @@ class Series(ProgramTest):
         self.assertEqual(self.run_program('validate', strong).returncode, 0)
         result = self.run_program('validate', strong, '--backend', 'rig', '--set', 'driver.kind=pci')
         self.assertEqual(result.returncode, 2, result.stdout)
-        self.assertIn('more than 4.458 N m', result.stderr)
+        self.assertIn('more than the 4.458 N m that gate.brake_duty_max allows; give at most that', result.stderr)
         long = self.script('[[phase]]\nname = "a"\nuntil = { lasts_s = 1 }\n[limits]\nrun_time_s = 0.5\n')
         result = self.run_program('validate', long)
         self.assertEqual(result.returncode, 2, result.stdout)

@@ -121,7 +121,7 @@ TEST_CASE("values beyond the rig's limits are named with phase, value and limit"
       "}\n");
   const auto problems = beyond_limits(plan(script, s), s);
   REQUIRE(problems.size() == 1);
-  CHECK(problems[0] == "phase \"hard\": brake torque 6 N m is more than 4.458 N m");
+  CHECK(problems[0] == "phase \"hard\": brake torque 6 N m is more than the 4.458 N m that gate.brake_duty_max allows");
   s.gate.brake_duty_max = 1.0;
   CHECK(beyond_limits(plan(script, s), s).empty());
 }
@@ -130,8 +130,19 @@ TEST_CASE("limits that every run must exceed are named") {
   const auto faults = [](const std::string& ends, const std::string& limits) {
     std::string script;
     for (const char* name : {"a", "b"}) script += "[[phase]]\nname = \"" + std::string(name) + "\"\n" + ends + "\n";
-    return certain_faults(plan(parsed(script + "[limits]\n" + limits), {}));
+    Settings s;
+    const Script read = parsed(script + "[limits]\n" + limits);
+    apply(read, s);
+    return certain_faults(plan(read, s), s);
   };
+  const std::string fast = "{ upper_speed_above_rad_s = 100 }";
+  CHECK(faults("until = " + fast + "\nat_most_s = 3", "wheel_speed_rad_s = 90").at(1) ==
+        "phase \"b\" waits for a wheel speed of at least 100 rad/s, but limits.wheel_speed_rad_s "
+        "(gate.overspeed_rad_s) is 90 rad/s: every run ends as a fault; change one");
+  CHECK(faults("until = " + fast + "\nat_most_s = 3", "wheel_speed_rad_s = 100").empty());
+  CHECK(faults("until.any = [" + fast + ", { lasts_s = 1 }]", "wheel_speed_rad_s = 90").empty());
+  CHECK(faults("until.all = [" + fast + ", { lasts_s = 1 }]\nat_most_s = 3", "wheel_speed_rad_s = 90").size() == 2);
+  CHECK(faults("until = { car_speed_above_m_s = 10 }\nat_most_s = 3", "wheel_speed_rad_s = 90").size() == 2);
   const auto late = faults("until = { lasts_s = 5 }\nat_most_s = 3", "");
   REQUIRE(late.size() == 2);
   CHECK(late[1] == "phase \"b\" lasts at least 5 s, but its at_most_s is 3 s: every run ends as a fault; change one");

@@ -98,7 +98,7 @@ TEST_CASE("results hold a row for every run, in order, and say which study they 
   CHECK_THAT(result_row(study, 0, {.refusal = "so, \"no\""}), Contains(R"(,refused,"so, ""no""",nan,)"));
 }
 
-TEST_CASE("a chunk that is damaged, cut off or another's stops the merge, which names the file") {
+TEST_CASE("a chunk that is damaged, cut off or another's stops the merge, which names the file, and is computed anew") {
   const Study study = small_study();
   const abs_hil::test::TemporaryFolder scratch;
   const StudyFolder folder(scratch / "whole", facts_of(study, "small"));
@@ -115,10 +115,16 @@ TEST_CASE("a chunk that is damaged, cut off or another's stops the merge, which 
         gzip_member(fewer, member.note), gzip_member("9" + member.content, member.note),
         bytes_of(folder.path() / file::parts / "00000002.csv.gz")}) {
     write(bad);
-    CHECK_THROWS_WITH(folder.merge({}), Contains("00000001.csv.gz") && Contains("remove this file"));
+    CHECK_THROWS_WITH(folder.merge({}), Contains("00000001.csv.gz") && Contains("run the study again"));
+    CHECK(missing_chunks(folder, {}) == std::vector<std::uint64_t>{1});
+    CHECK(missing_chunks(folder, {.number = 1, .of = 2}).empty());
     CHECK_FALSE(folder.complete());
   }
-  write(good);
+  const Tally tally = compute(study, folder, {}, 1, {});
+  CHECK(tally.damaged == std::vector<std::uint64_t>{1});
+  CHECK(tally.runs == 4);
+  CHECK(bytes_of(chunk) == good);
+  CHECK(compute(study, folder, {}, 1, {}).damaged.empty());
   folder.merge({});
   CHECK(folder.complete());
 }
