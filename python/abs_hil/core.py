@@ -1,10 +1,10 @@
 """Loads the compiled module abs_hil._core and tells it where the configuration files are."""
+import contextlib
 import importlib
 import pathlib
 import sys
 import sysconfig
 import warnings
-from collections.abc import Iterable
 from typing import Any
 
 try:
@@ -17,16 +17,11 @@ __all__ = ['_core', 'load_network']
 
 
 def _config_dir() -> pathlib.Path | None:
-    try:
+    with contextlib.suppress(ImportError):
         from ._build_tree import CONFIG_DIR
         return pathlib.Path(CONFIG_DIR)
-    except ImportError:
-        pass
-    for prefix in (sysconfig.get_path('data'), sys.prefix, '/usr', '/usr/local'):
-        folder = pathlib.Path(prefix) / 'share' / 'abs_hil' / 'config'
-        if folder.is_dir():
-            return folder
-    return None
+    prefixes = (sysconfig.get_path('data'), sys.prefix, '/usr', '/usr/local')
+    return next((folder for prefix in prefixes if (folder := pathlib.Path(prefix, 'share', 'abs_hil', 'config')).is_dir()), None)
 
 
 def load_network(purpose: str) -> Any:
@@ -39,18 +34,13 @@ def load_network(purpose: str) -> Any:
                       'python3-abs-hil has it; Windows and macOS have no such module') from error
 
 
-def _newer_than(module: pathlib.Path, libraries: Iterable[str]) -> list[str]:
-    """The libraries that were built after the module, which was linked from an earlier state of them."""
-    linked = module.stat().st_mtime
-    return [library for library in libraries if (path := pathlib.Path(library)).exists() and path.stat().st_mtime > linked]
-
-
 def _warn_if_old() -> None:
     try:
         from ._build_tree import CORE_LIBRARIES, PROGRAM
     except ImportError:
         return  # installed: the program and the module came together
-    if _newer_than(pathlib.Path(_core.__file__), CORE_LIBRARIES):
+    linked = pathlib.Path(_core.__file__).stat().st_mtime
+    if any(library.exists() and library.stat().st_mtime > linked for library in map(pathlib.Path, CORE_LIBRARIES)):
         build = pathlib.Path(PROGRAM).parent.parent
         warnings.warn(f'abs_hil: the compiled module {_core.__file__} is older than the program {PROGRAM}: laws, keys and '
                       f'results can differ; build it too: `cmake --build {build} --target abs_hil_python`', stacklevel=2)

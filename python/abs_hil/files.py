@@ -1,10 +1,14 @@
 """Files that are either complete or absent."""
+import errno
 import os
 import pathlib
 import tempfile
 from collections.abc import Callable
 
 from .core import _core
+
+#: bytes that a text may have
+_TEXT_MAX = 1 << 26
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *, probe: bool = False) -> None:
@@ -25,8 +29,18 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *,
     try:
         _core.write_result(os.fsencode(path), into, probe)
     except OSError as error:
-        raise ValueError(f'cannot write "{path}": {error.strerror}; give a path in an existing, writable directory'
-                         if error.strerror else str(error)) from None
+        fix = ('free some space on that file system, or choose another' if error.errno in (errno.ENOSPC, errno.EDQUOT) else
+               'give a path in an existing, writable directory')
+        raise ValueError(f'cannot write "{path}": {error.strerror}; {fix}' if error.strerror else str(error)) from None
+
+
+def read_text(path: pathlib.Path) -> str:
+    """The text of a file. Raises OSError, also for one that no program here writes: a device may have no end."""
+    with open(path, 'rb') as file:
+        content = file.read(_TEXT_MAX + 1)
+    if len(content) > _TEXT_MAX:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    return content.decode('utf-8')
 
 
 def make_folder(folder: pathlib.Path, option: str) -> None:

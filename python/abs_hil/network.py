@@ -1,4 +1,5 @@
 """Messages of a running rig, over LCM."""
+import contextlib
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -22,14 +23,10 @@ def live(url: str = '', *, channel: str = 'TELEMETRY', prefix: str = 'ABS_', tim
 
 
 def _messages(subscription: Any, timeout_s: float | None) -> Iterator[Any]:
-    slice_s = 1.0
     while True:
-        received = subscription.next(slice_s if timeout_s is None else timeout_s)
-        if received is None:
-            if timeout_s is not None:
-                return
-            continue
-        try:
-            yield decode(received[1])
-        except ValueError:
-            continue
+        received = subscription.next(1.0 if timeout_s is None else timeout_s)
+        if received is not None:
+            with contextlib.suppress(ValueError):
+                yield decode(received[1])
+        elif timeout_s is not None:
+            return

@@ -20,14 +20,19 @@ def program() -> str:
     """The program abs_hil: of this build tree, beside this Python, or in the PATH. Raises ValueError without one."""
     try:
         from ._build_tree import PROGRAM
+        return str(PROGRAM)
     except ImportError:
         beside = pathlib.Path(sys.executable).with_name('abs_hil')
         found = str(beside) if beside.exists() else shutil.which('abs_hil')
-    else:
-        found = str(PROGRAM)
     if found is None:
         raise ValueError('controllers from files need the program abs_hil, which is not in the PATH; install it')
     return found
+
+
+def failed(name: str, error: object, status: int = 2) -> int:
+    """Says why a program ends; its exit status."""
+    print(f'{name}: {error}', file=sys.stderr)
+    return status
 
 
 @functools.cache
@@ -70,27 +75,21 @@ def whole(least: int, most: int) -> Callable[[str], int]:
     return number
 
 
-def _seed(seed: Any) -> str:
-    try:
-        return str(operator.index(seed))
-    except TypeError:
-        raise ValueError(f'seed {seed!r}: give an integer of at least 0') from None
-
-
 def options(*, controller: Any = None, plant: PathLike | None = None, model: PathLike | None = None,
             experiment: PathLike | None = None, config: PathLike | None = None, seed: int | None = None,
             set: Mapping[str, Value] | None = None, inject: Sequence[str] = ()) -> dict[str, Any]:
     """Options for abs_hil._core; a controller that is not a name is left out."""
-    given: dict[str, Any] = {}
-    for name, value in (('plant', plant), ('model', model), ('experiment', experiment), ('config', config)):
-        if value is not None:
-            given[name] = os.fspath(value)
+    files = {'plant': plant, 'model': model, 'experiment': experiment, 'config': config}
+    given: dict[str, Any] = {name: os.fspath(value) for name, value in files.items() if value is not None}
     if isinstance(controller, str):
         if controller.endswith(('.so', '.fmu', '.agent')) or ':' in controller:
             _take_controller_files()
         given['controller'] = controller
     if seed is not None:
-        given['seed'] = _seed(seed)
+        try:
+            given['seed'] = str(operator.index(seed))
+        except TypeError:
+            raise ValueError(f'seed {seed!r}: give an integer of at least 0') from None
     if set:
         given['set'] = _assignments(set)
     if inject:

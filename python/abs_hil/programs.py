@@ -42,6 +42,12 @@ class _Stdout(io.FileIO):
 
 def start(name: str, arguments: list[str]) -> int:
     """Starts a program. A full disk behind stdout is status 1, whatever the program made of it."""
+    for number in range(3):  # a closed one is as /dev/null, and no other file takes its number
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdout, sys.stderr = (stream or open(os.devnull, 'w', encoding='utf-8') for stream in (sys.stdout, sys.stderr))
     raw = _Stdout(1, 'wb', closefd=False)
     codecs.register_error('abs_hil', _plainly)
     sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors='abs_hil',

@@ -7,11 +7,10 @@ of Table 1, as if somebody had measured them.
 import argparse
 import pathlib
 import random
-import sys
 from collections.abc import Sequence
 
 from .files import refuse_existing, write_text
-from .options import whole
+from .options import failed, whole
 from .simulation import keys
 
 #: key: largest change, over the value of START
@@ -61,7 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         refuse_existing(o.out, '--out', o.force)
         write_text(o.out, unknown_rig(o.seed, o.kind == 'wandering'))
     except ValueError as error:
-        print(f'abs_hil rig: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_hil rig', error)
     print(f'{o.out}: use it with --plant {o.out}; its parameters are the answer, so do not read it')
     return 0

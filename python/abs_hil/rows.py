@@ -47,8 +47,7 @@ def read_rows(path: str | os.PathLike[str]) -> Rows:
         raise ValueError(f'cannot read "{place}": {error.strerror}; give a run\'s CSV file or folder') from None
     end = data.rfind(b'\n') + 1
     truncated = end < len(data)
-    if truncated:
-        data = data[:end]
+    data = data[:end]
     names, first = _header(place, data, truncated)
     if len(data) == first:
         raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else

@@ -1,6 +1,7 @@
 """A run's rows, summary and signals, from the simulator or from files."""
 from __future__ import annotations
 
+import itertools
 import os
 import pathlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -116,14 +117,10 @@ class Series:
         configs = [run.config for run in self.runs]
         keys = sorted({key for config in configs for key in config})
         varied = [key for key in keys if len({str(config.get(key)) for config in configs}) > 1]
-        rows = []
-        for run, config in zip(self.runs, configs):
-            row: dict[str, Any] = {'run': run.name}
-            row.update((key, config.get(key)) for key in varied)
-            row.update((key, value) for key, value in run.summary.items()
-                       if value is None or isinstance(value, (int, float, str)))
-            rows.append(row)
-        return pandas.DataFrame(rows)
+        return pandas.DataFrame([
+            {'run': run.name, **{key: config.get(key) for key in varied},
+             **{key: value for key, value in run.summary.items() if isinstance(value, (int, float, str, type(None)))}}
+            for run, config in zip(self.runs, configs)])
 
 
 def csv_bytes(columns: Mapping[str, np.ndarray], header: bool = True) -> bytes:
@@ -186,12 +183,7 @@ def read_csv(path: PathLike) -> tuple[dict[str, np.ndarray], tuple[str, ...], li
 
 def signals_of(columns: list[str]) -> tuple[str, ...]:
     """The controller's own signals: they follow the fixed columns and the phase's own name."""
-    signals = []
-    for name in columns[len(COLUMNS) + ('phase_name' in columns):]:
-        if not _core.is_signal_name(name):
-            break
-        signals.append(name)
-    return tuple(signals)
+    return tuple(itertools.takewhile(_core.is_signal_name, columns[len(COLUMNS) + ('phase_name' in columns):]))
 
 
 def load(path: PathLike) -> Run:
@@ -272,10 +264,10 @@ def load_series(folder: PathLike) -> Series:
     place = pathlib.Path(folder)
     folders, notes = runs_in_series(place)
     runs = [load(path) for path in folders]
-    index: dict[str, Any] = {}
     try:
         index = read_object(place / 'series.json')
     except ValueError:
+        index = {}
         notes.append('no readable series.json')
     return Series(runs, index, notes)
 

@@ -46,16 +46,19 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
     ends is no error: Run.summary["result"] is "fault". Raises ValueError, with the program's text, for options that
     cannot be used.
     """
-    # None: a default must not outrank a configuration file. The program has the same defaults.
-    given = options(controller=None if controller == 'adaptive' else controller,
-                    plant=None if plant == 'paper-table1' else plant,
-                    experiment=None if experiment == 'paper' else experiment, model=model, config=config,
-                    seed=None if seed == 1 else seed, set=set, inject=inject)
+    given = _given(controller, plant, seed, experiment=None if experiment == 'paper' else experiment, model=model, config=config,
+                   set=set, inject=inject)
     law = _law_of(controller)
     varied = None
     if repetition is not None:
         varied = (vary, _within('vary_seed', vary_seed, 0, SEED_MAX), _within('repetition', repetition, 0, REPEAT_MAX - 1))
     return run_of(*_core.simulate(given, law, varied))
+
+
+def _given(controller: Any, plant: PathLike, seed: int, **others: Any) -> dict[str, Any]:
+    """Options. A default must not outrank a configuration file, so it is left out: the program has the same defaults."""
+    return options(controller=None if controller == 'adaptive' else controller, plant=None if plant == 'paper-table1' else plant,
+                   seed=None if seed == 1 else seed, **others)
 
 
 def _within(name: str, number: int, least: int, most: int) -> int:
@@ -93,9 +96,7 @@ def simulate_series(experiment: PathLike = 'series-of-ten', controller: str = 'a
     Returns a Series: its runs equal those of `abs_hil --fast` in their folders, and its index has what series.json has of
     them. Raises ValueError before the first run for options that cannot be used.
     """
-    given = options(controller=None if controller == 'adaptive' else controller,
-                    plant=None if plant == 'paper-table1' else plant, experiment=experiment, model=model, config=config,
-                    seed=None if seed == 1 else seed, set=set)
+    given = _given(controller, plant, seed, experiment=experiment, model=model, config=config, set=set)
     runs, rows = [], []
     for number, (varied, its_seed, parts) in enumerate(_core.simulate_series(given), 1):
         runs.append(run_of(*parts))
@@ -171,15 +172,12 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
     with progress_shown(progress) as report:
         found = _core.simulate_many(given, pairs, vary, vary_seed, threads, report, laws)
     errors = found.pop('error')
-    if not keep_going:
-        for (number, _), error in zip(pairs, errors):
-            if error:
-                raise ValueError(f'run {number}: {error}' if len(jobs) > 1 else error)
+    for (number, _), error in zip(pairs, errors):
+        if error and not keep_going:
+            raise ValueError(f'run {number}: {error}' if len(jobs) > 1 else error)
     columns: dict[str, np.ndarray] = {}
-    flat = [{**run, **run.get('set', {})} for run in jobs]
-    for run, law in zip(flat, laws):
-        if law is not None:
-            run['controller'] = type(law).__name__
+    flat = [{**run, **run.get('set', {}), **({} if law is None else {'controller': type(law).__name__})}
+            for run, law in zip(jobs, laws)]
     for name in sorted({name for run in flat for name in run if name != 'set'}):
         values = [run.get(name) for run in flat]
         if len(jobs) == 1 or any(value != values[0] for value in values):
@@ -200,8 +198,6 @@ def _grid(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     for combination in itertools.product(*axes.values()):
         job: dict[str, Any] = {'set': {}}
         for name, value in zip(axes, combination):
-            if isinstance(value, np.generic):
-                value = value.item()
             (job['set'] if '.' in name else job)[name] = value
         jobs.append(job)
     return jobs
@@ -221,19 +217,8 @@ def progress_shown(wanted: bool | Callable[[int, int], None]) -> Iterator[Callab
         yield show
 
 
-def controllers() -> dict[str, str]:
-    """Name -> description of every controller of the program."""
-    return dict(_core.controllers())
-
-
-def plants() -> dict[str, str]:
-    """Name -> description of every plant."""
-    return dict(_core.plants())
-
-
-def experiments() -> dict[str, str]:
-    """Name -> description of every experiment."""
-    return dict(_core.experiments())
+#: functions without arguments: name -> description of every controller, plant and experiment of the program
+controllers, plants, experiments = _core.controllers, _core.plants, _core.experiments
 
 
 def keys(**arguments: Any) -> dict[str, dict[str, Any]]:

@@ -1,19 +1,20 @@
 """abs_tune: searches for a controller's gains in simulation and writes them as a configuration file (docs/comparison.md)."""
 import argparse
 import inspect
+import itertools
 import math
 import pathlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .core import _core
 from .figures import OVERSHOOT
 from .files import make_folder, write_text, write_whole
-from .options import options, whole
+from .options import failed, options, whole
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 
 #: the paper brakes from 1625 rpm
@@ -37,9 +38,9 @@ class Gain:
 
     def value_at(self, coordinate: float) -> float:
         """The value, of three digits, at a coordinate in [0, 1]."""
-        if self.logarithmic:
-            return float(f'{self.least * (self.most / self.least) ** coordinate:.3g}')
-        return float(f'{self.least + coordinate * (self.most - self.least):.3g}')
+        value = (self.least * (self.most / self.least) ** coordinate if self.logarithmic else
+                 self.least + coordinate * (self.most - self.least))
+        return float(f'{value:.3g}')
 
 
 def gains_of(controller: str) -> list[Gain]:
@@ -129,9 +130,8 @@ class Judge:
 
     def _distances(self, controller: str, values: dict[str, float | bool]) -> np.ndarray:
         study = self.training.run([self.training.arguments(plant, controller, values) for plant in self.training.plants])
-        for error in study['error']:
-            if error:
-                raise ValueError(error)
+        if error := next(filter(None, study['error']), ''):
+            raise ValueError(error)
         return study['stop_distance_m']
 
     def values(self, point: np.ndarray) -> list[float]:
@@ -150,19 +150,10 @@ class Judge:
         return cost.reshape(count, -1).mean(axis=1)
 
 
-class Candidates(Protocol):
-    """What a search needs: the gains, the values at a point of the unit cube, and what candidates cost."""
-    gains: list[Gain]
-    evaluations: int
-
-    def values(self, point: np.ndarray) -> list[float]: ...
-
-    def costs(self, candidates: list[list[float] | None]) -> np.ndarray: ...
-
-
-def search(judge: Candidates, generations: int, seed: int,
+def search(judge: Any, generations: int, seed: int,
            progress: Callable[[int, float], None] = lambda generation, cost: None) -> Found:
-    """Differential evolution by SciPy: rand-to-best/1/bin, F 0.7, CR 0.9, 8 candidates a gain (16 to 40).
+    """Differential evolution by SciPy: rand-to-best/1/bin, F 0.7, CR 0.9, 8 candidates a gain (16 to 40). judge: a Judge, or
+    what has its gains, evaluations, values and costs.
 
     The defaults do not enter the search, so that it finds the same gains whatever they are.
     """
@@ -172,14 +163,10 @@ def search(judge: Candidates, generations: int, seed: int,
     dimensions = len(judge.gains)
     size = min(max(8 * dimensions, 16), 40)
     first = np.random.default_rng(seed).random((size, dimensions))
-    generation = 0
+    generation, best = itertools.count(1), [math.inf]
 
     def callback(_: np.ndarray, convergence: float = 0.0) -> None:
-        nonlocal generation
-        generation += 1
-        progress(generation, float(best[0]))
-
-    best = [math.inf]
+        progress(next(generation), float(best[0]))
 
     def cost(points: np.ndarray) -> np.ndarray:
         found = judge.costs([judge.values(point) for point in np.atleast_2d(points.T)])
@@ -252,6 +239,5 @@ def main(arguments: list[str]) -> int:
         for controller in chosen:
             _tune(controller, o)
     except (ValueError, OSError) as error:
-        print(f'abs_tune: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_tune', error)
     return 0

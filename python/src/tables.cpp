@@ -96,10 +96,10 @@ void take_controller_files(const std::string& ending, const py::capsule& maker) 
 }  // namespace
 
 void add_tables(py::module_& module) {
-  module.def("controllers", &controllers);
+  module.def("controllers", &controllers, "Name -> description of every controller of the program.");
   module.def("take_controller_files", &take_controller_files, py::arg("ending"), py::arg("maker"));
-  module.def("plants", &plants);
-  module.def("experiments", &experiments);
+  module.def("plants", &plants, "Name -> description of every plant.");
+  module.def("experiments", &experiments, "Name -> description of every experiment.");
   module.def("figures", &figures);
   module.def("keys", &keys, py::arg("options"));
   module.def("section_of", [](const std::string& controller) { return control::section_of(controller); });

@@ -17,6 +17,7 @@ import abs_hil
 from abs_hil import programs
 from abs_hil.benchmark import Entry, bounds, cases, run
 from abs_hil.benchmark.program import main
+from abs_hil.interchange.host import made
 from abs_hil.report.page import Unavailable, plotly_js
 
 #: of everything that version 2 consists of
@@ -24,9 +25,12 @@ SET_2 = '0a2c950cf849513e355fa199a7f981751edded326ce8d729ad3ec9eca15153ae'
 BOUNDS_2 = '633a4551e0daf6ee008d47b7114f937698507912383c6e11fb2052c9f4538bf4'
 
 
-class WrappedPi:
-    """The program's pi, as a controller in Python."""
+LAWS = """
+import math
+import os
+import abs_hil
 
+class WrappedPi:
     def __init__(self):
         self.law = abs_hil.Controller('pi')
 
@@ -36,15 +40,25 @@ class WrappedPi:
     def step(self, given):
         return self.law.step(given)
 
-
 class Broken(WrappedPi):
     def step(self, given):
         return math.nan
 
-
 class Raising(WrappedPi):
     def step(self, given):
-        raise ValueError('no bad input, but the law\'s own')
+        raise ValueError("no bad input, but the law's own")
+
+class Ending(WrappedPi):
+    def step(self, given):
+        os._exit(0)
+"""
+
+
+@pytest.fixture
+def own_laws(tmp_path, monkeypatch):
+    """Controllers in Python, in the present folder."""
+    (tmp_path / 'own_laws.py').write_text(LAWS)
+    monkeypatch.chdir(tmp_path)
 
 
 def few():
@@ -166,10 +180,9 @@ def test_braking_begins_at_the_speed_of_the_case():
     assert found.columns['omega2_rad_s'][first] == pytest.approx(170.0, abs=1e-3)
 
 
-def test_a_controller_in_python_scores_as_the_same_law_in_the_program():
-    sys.modules.setdefault('test_benchmark', sys.modules[__name__])
+def test_a_controller_in_python_scores_as_the_same_law_in_the_program(own_laws):
     known, chosen = bounds.stored(), few()
-    law, wrapped = (run(Entry(name, {}), chosen, known, seeds=(1,)) for name in ('pi', 'test_benchmark:WrappedPi'))
+    law, wrapped = (run(Entry(name, {}), chosen, known, seeds=(1,)) for name in ('pi', 'own_laws:WrappedPi'))
     for of_law, of_wrapped in zip(law.rows, wrapped.rows):
         assert of_wrapped['stop_distance_m'] == of_law['stop_distance_m']
         assert of_wrapped['torque_total_variation_Nm'] == of_law['torque_total_variation_Nm']
@@ -180,20 +193,21 @@ def test_a_controller_in_python_scores_as_the_same_law_in_the_program():
     assert law.total.excess_worst == max(row['excess'] for row in law.rows)
 
 
-def test_a_run_that_fails_has_no_distance():
-    sys.modules.setdefault('test_benchmark', sys.modules[__name__])
-    broken = run(Entry('test_benchmark:Broken', {}), few(), bounds.stored(), seeds=(1,))
+def test_a_run_that_fails_has_no_distance(own_laws):
+    broken = run(Entry('own_laws:Broken', {}), few(), bounds.stored(), seeds=(1,))
     assert broken.total.failed == 2
     assert math.isnan(broken.total.excess_mean)
 
 
-def test_a_law_that_raises_fails_and_the_others_have_their_scores(tmp_path, capsys, monkeypatch):
-    sys.modules.setdefault('test_benchmark', sys.modules[__name__])
+@pytest.mark.parametrize(('law', 'words'), [('Raising', "ValueError: no bad input, but the law's own\n"), ('Ending', '')])
+def test_a_law_that_ends_fails_and_the_others_have_their_scores(law, words, own_laws, tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(cases, 'quick_cases', few)
     target = tmp_path / 'score.json'
-    names = ['--controller', 'pi,test_benchmark:Raising']
+    names = ['--controller', f'pi,own_laws:{law}']
     assert main(['--quick', *names, '--json', str(target)]) == 0
-    assert 'test_benchmark:Raising: ValueError: no bad input' in capsys.readouterr().err
+    said = capfd.readouterr()
+    assert words in said.err and f'own_laws:{law}: 2 of 2 runs failed: controller_not_finite' in said.err
+    assert f'`own_laws:{law}`' in said.out
     found = json.loads(target.read_text(encoding='utf-8'))['controllers']
     assert [one['scores'][-1]['failed'] for one in found] == [0, 2]
     assert found[1]['runs'][0]['fault'] == 'controller_not_finite'
@@ -303,6 +317,9 @@ def test_anybody_can_check_a_result(tmp_path, capsys):
     for change, words in ((lambda d: d.update(version=1), 'version 1'), (lambda d: d.pop('controllers'), 'no result'),
                           (lambda d: d['controllers'][0]['scores'].append(1), 'no result'),
                           (lambda d: d['controllers'][0]['runs'].clear(), 'has no runs'),
+                          (lambda d: d['controllers'].clear(), 'no result'),
+                          (lambda d: d['controllers'][0]['settings'].update({'plant.theta_N': 60}),
+                           'pi: setting "plant.theta_N": give keys under control. alone'),
                           (lambda d: d['controllers'][0].update(name='nobody'), 'nobody'),
                           (lambda d: d['controllers'][0]['runs'][0].update(seed=float('inf')), 'no result'),
                           (lambda d: d['controllers'][0]['runs'][0].update(case='mine'), 'not of the set')):
@@ -343,6 +360,6 @@ def test_a_class_is_found_in_the_present_folder(tmp_path, monkeypatch):
     (tmp_path / 'law_of_this_folder.py').write_text('class Law:\n    reset = step = print\n')
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, 'path', [folder for folder in sys.path if folder != ''])
-    assert type(Entry('law_of_this_folder:Law', {}).made()).__name__ == 'Law'
+    assert type(made('law_of_this_folder:Law')).__name__ == 'Law'
     with pytest.raises(ValueError, match='in this folder or on PYTHONPATH'):
-        Entry('law_of_no_folder:Law', {}).made()
+        made('law_of_no_folder:Law')

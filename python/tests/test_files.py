@@ -109,6 +109,21 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
         assert (result.returncode, result.stderr) == (0, ''), result
 
 
+def test_a_closed_output_is_as_dev_null(tmp_path, abs_hil_program):
+    abs_hil_program('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--out', tmp_path / 'run')
+    for closed, words in (('>&-', ('report', '--help')), ('>&- 2>&-', ('report', '--csv', tmp_path / 'run')),
+                          ('2>&-', ('report', '--table', tmp_path / 'run'))):
+        result = subprocess.run(['sh', '-c', f'exec "$0" "$@" {closed}', *command(*words)], capture_output=True, text=True)
+        assert (result.returncode, result.stderr) == (0, ''), result
+        assert ('stop time' in result.stdout) == (closed == '2>&-')
+
+
+@pytest.mark.skipif(not os.path.exists('/dev/full'), reason='needs a device without space')
+def test_the_fix_of_a_full_disk_is_space(tmp_path):
+    with pytest.raises(ValueError, match='No space left on device; free some space on that file system'):
+        write_whole(tmp_path / 'page', lambda name: pathlib.Path('/dev/full').write_text('words'))
+
+
 def test_standard_output_gets_what_its_encoding_has(tmp_path, abs_hil_program):
     run = tmp_path / 'rün'
     abs_hil_program('--fast', '--no-lcm', '--out', run)

@@ -2,6 +2,7 @@
 import base64
 import gzip
 import json
+import os
 import re
 
 import pytest
@@ -37,6 +38,8 @@ def test_the_ready_exercises_can_be_read():
     ('title = "a"\ntask = "b"\n[offered]\nplants = ["mars"]', 'offered.plants: unknown "mars"; known: .*paper-table1'),
     ('title = "a"\ntask = "b"\n[offered]\nkeys = ["plant.B"]\n[hidden]\nset = { "plant.B" = 20 }', 'plant.B is in hidden.set too'),
     ('title = "a"\ntask = "b"\n[[goal]]\nfigure = "slip"', 'goal.figure: unknown "slip"; known: .*slip_rms'),
+    ('title = "a"\ntask = "b"\n[[goal]]\nfigure = "slip_rms"\nsays = "c"\nat_most = nan', 'at_most = nan: give finite numbers'),
+    ('title = "a"\ntask = "b"\n[start]\nset = { "plant.theta_N" = inf }', 'start.set = .*: give finite numbers'),
     ('title = "a"\ntask = "b"\n[[goal]]\nfigure = "slip_rms"\nsays = "c"', 'goal of slip_rms: give says, and at_most or at_least'),
 ])
 def test_refused_exercises(tmp_path, text, message):
@@ -44,6 +47,12 @@ def test_refused_exercises(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
         exercise.read(path)
+
+
+@pytest.mark.skipif(not os.path.exists('/dev/zero'), reason='needs a device without an end')
+def test_an_exercise_without_an_end():
+    with pytest.raises(ValueError, match='"/dev/zero": File too large; give a TOML file'):
+        exercise.read(exercise.find('/dev/zero'))
 
 
 def test_a_task_has_its_own_lines(tmp_path):

@@ -1,6 +1,4 @@
 """The benchmark: a fixed set of brakings, scored against their causal optima (docs/benchmark.md)."""
-from __future__ import annotations
-
 from .cases import VERSION, Case, drawn, whole_set
 from .score import Entry, Result, Score, run
 

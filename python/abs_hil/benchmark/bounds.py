@@ -1,20 +1,14 @@
 """The optima of the benchmark's cases: stored with the package, or computed (research/benchmark_bounds.py)."""
-from __future__ import annotations
-
 import hashlib
 import json
 import pathlib
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
-from ..files import write_text
+from ..files import read_text, write_text
 from ..nesting import parse_json
 from ..options import Value
 from ..stepped import Plant
 from .cases import COAST_S, END_SPEED_M_S, VERSION, Case
-
-if TYPE_CHECKING:
-    from ..optimum import Trajectory
 
 #: what the bound leaves out, which can only shorten the distance
 _IGNORED = ('brake_dead_time_s', 'brake_hysteresis', 'encoder_')
@@ -45,16 +39,13 @@ def coasted(case: Case) -> tuple[float, float, float]:
     return begun, float(plant.state.omega1_rad_s), float(plant.state.omega2_rad_s)
 
 
-def stored() -> dict[str, dict[str, float]]:
+def stored(path: pathlib.Path | None = None) -> dict[str, dict[str, float]]:
     """identity -> distance_m, time_s, torque_variation_Nm and distance_on_plant_m of the causal optimum, least_distance_m of one
-    who knows the whole road. Raises ValueError for a file that somebody has changed."""
-    return _read(STORED)
-
-
-def _read(path: pathlib.Path) -> dict[str, dict[str, float]]:
-    """Raises ValueError for a file that is none, that another version wrote, or that somebody has changed."""
+    who knows the whole road. Raises ValueError for a file that is none, that another version wrote, or that somebody has
+    changed."""
+    path = path or STORED
     try:
-        content = parse_json(path.read_text(encoding='utf-8'))
+        content = parse_json(read_text(path))
         version, found, kept = content['version'], dict(content['bounds']), content.get('checksum')
     except (OSError, KeyError, TypeError, ValueError):
         raise ValueError(f'{path}: no file of bounds; give one that --bounds has written, or a new name') from None
@@ -66,18 +57,16 @@ def _read(path: pathlib.Path) -> dict[str, dict[str, float]]:
 
 
 def text_of(bounds: dict[str, dict[str, float]]) -> str:
-    """A file of bounds."""
     return json.dumps({'version': VERSION, 'checksum': checksum(bounds), 'bounds': bounds}, indent=1) + '\n'
 
 
 def checksum(bounds: dict[str, dict[str, float]]) -> str:
-    """SHA-256 of bounds."""
     return hashlib.sha256(json.dumps(bounds, sort_keys=True).encode()).hexdigest()
 
 
 def compute(case: Case) -> dict[str, float]:
     """The causal optimum of a case, and the distance of one who knows the whole road. Needs casadi."""
-    from ..optimum import drive, optimum
+    from ..optimum import Trajectory, drive, optimum
     values = values_of(case)
     _, upper_rad_s, lower_rad_s = coasted(case)
 
@@ -99,7 +88,7 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
     A case for which the solver finds none has an empty one. What is computed goes into `kept` at once, so that an interrupted
     computation goes on where it was. Raises ValueError for a file that holds something else.
     """
-    own = _read(kept) if kept is not None and kept.exists() else {}
+    own = stored(kept) if kept is not None and kept.exists() else {}
     known = stored() | own
     for case in missing(cases, known):
         try:
@@ -108,12 +97,12 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
             raise ValueError('the bounds of drawn cases are computed with casadi; pip install casadi, or give --bounds FILE '
                              'with all of them') from None
         try:
-            known[identity(case)] = own[identity(case)] = compute(case)
+            own[identity(case)] = compute(case)
         except NoOptimum:
-            known[identity(case)] = own[identity(case)] = {}
+            own[identity(case)] = {}
         if kept is not None:
             write_text(kept, text_of(own))
-    return known
+    return known | own
 
 
 def missing(cases: Iterable[Case], known: dict[str, dict[str, float]]) -> list[Case]:

@@ -1,6 +1,4 @@
 """The fixed set of the benchmark (docs/benchmark.md). A change of any case is a new version."""
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -72,14 +70,6 @@ class Case:
         return {**self.plant_values(), **model, **self.settings}
 
 
-def _nominal() -> list[Case]:
-    return [Case('nominal', 'as it is', plant, road) for plant in PLANTS for road in ROADS]
-
-
-def _speeds() -> list[Case]:
-    return [Case('speeds', f'{speed} rad/s', plant, 'even', float(speed)) for plant in PLANTS for speed in (60, 90, 130)]
-
-
 #: name -> changes of the plant, whether the model follows them, other settings. The lags are those of time constants of 35
 #: and 70 ms instead of 49 ms.
 MISMATCHES: dict[str, tuple[dict[str, Value], bool, dict[str, Value]]] = {
@@ -99,24 +89,10 @@ MISMATCHES: dict[str, tuple[dict[str, Value], bool, dict[str, Value]]] = {
 LEAST_AT_DROP_M_S = 3.0
 #: changes that the model has no key for
 _PLANT_ONLY = ('brake_dead_time_s', 'brake_hysteresis')
-
-
 #: roads of the mismatches
 _MISMATCH_ROADS = ('even', 'jump', 'patches')
-
-
-def _mismatches() -> list[Case]:
-    return [Case('mismatch', name, plant, road, changes=changes,
-                 unknown=() if known else tuple(key for key in changes if key not in _PLANT_ONLY), settings=settings)
-            for plant in PLANTS for road in _MISMATCH_ROADS for name, (changes, known, settings) in MISMATCHES.items()]
-
-
 #: The drivers of the boards send no larger duty by default (docs/rig-setup.md). Gate and controllers know it.
 CAPPED: dict[str, Value] = {'brake_duty_max': 0.7}
-
-
-def _capped() -> list[Case]:
-    return [Case('capped', 'duty at most 0.7', plant, road, changes=CAPPED) for plant in PLANTS for road in _MISMATCH_ROADS]
 
 
 def _left_m_s(changes: Mapping[str, Value], speed_rad_s: float, road: str) -> float:
@@ -191,8 +167,13 @@ def quick_cases() -> list[Case]:
 
 
 def whole_set() -> list[Case]:
-    return [*_nominal(), *_speeds(), *_mismatches(), *drawn(DRAW_SEED, DRAWN), *_capped(),
-            *combined(DRAW_SEED, COMBINED)]
+    nominal = [Case('nominal', 'as it is', plant, road) for plant in PLANTS for road in ROADS]
+    speeds = [Case('speeds', f'{speed} rad/s', plant, 'even', float(speed)) for plant in PLANTS for speed in (60, 90, 130)]
+    mismatches = [Case('mismatch', name, plant, road, changes=changes,
+                       unknown=() if known else tuple(key for key in changes if key not in _PLANT_ONLY), settings=settings)
+                  for plant in PLANTS for road in _MISMATCH_ROADS for name, (changes, known, settings) in MISMATCHES.items()]
+    capped = [Case('capped', 'duty at most 0.7', plant, road, changes=CAPPED) for plant in PLANTS for road in _MISMATCH_ROADS]
+    return [*nominal, *speeds, *mismatches, *drawn(DRAW_SEED, DRAWN), *capped, *combined(DRAW_SEED, COMBINED)]
 
 
 def checksum() -> str:

@@ -1,26 +1,31 @@
-"""The result of the benchmark as text, Markdown and JSON."""
-from __future__ import annotations
-
+"""The result of the benchmark as text, Markdown and JSON, and as one HTML page that needs no network."""
 import dataclasses
 import json
 import math
+import pathlib
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from ..core import _core
+from ..report.model import STYLES, Curve, Figure, Label, Panel, run_style
+from ..report.page import render, view
+from ..report.tables import Table
 from . import bounds, cases
 from .cases import VERSION
 from .score import Result, Score
 
 _COLUMNS = [field for field in dataclasses.fields(Score) if field.metadata]
 HEADINGS = tuple(field.metadata['heading'] for field in _COLUMNS)
+_FOLDER = pathlib.Path(__file__).parent
+_MARKERS = ('circle', 'triangle', 'open circle')
+#: excess beyond this is drawn at the edge
+_MOST_EXCESS = 0.5
 
 
-def _number(value: float, decimals: int) -> str:
-    return '–' if math.isnan(value) else f'{value:.{decimals}f}'
-
-
-def _cells(score: Score) -> list[str]:
-    return [_number(field.metadata['scale'] * getattr(score, field.name), field.metadata['decimals']) for field in _COLUMNS]
+def _cell(value: float, scale: float, decimals: int, **_: object) -> str:
+    return '–' if math.isnan(value) else f'{scale * value:.{decimals}f}'
 
 
 def ranked(results: Sequence[Result], group: str = 'all') -> list[tuple[str, Score]]:
@@ -32,7 +37,8 @@ def ranked(results: Sequence[Result], group: str = 'all') -> list[tuple[str, Sco
 
 def cells(results: Sequence[Result], group: str = 'all') -> list[list[str]]:
     """The rows of a table: a controller's name and its figures."""
-    return [[name, *_cells(score)] for name, score in ranked(results, group)]
+    return [[name, *(_cell(getattr(score, field.name), **field.metadata) for field in _COLUMNS)]
+            for name, score in ranked(results, group)]
 
 
 def table(results: Sequence[Result], group: str = 'all') -> str:
@@ -62,6 +68,51 @@ def as_json(results: Sequence[Result], whole: bool, program: str) -> str:
     document = {'benchmark': 'abs_hil', 'version': VERSION, 'set': cases.checksum(), 'bounds': bounds.checksum(bounds.stored()),
                 'whole': whole, 'program': program, 'controllers': [
         {'name': result.entry.name, 'warm': result.entry.warm, 'settings': dict(result.entry.settings),
-         'scores': [{key: known(value) for key, value in score.as_row().items()} for score in result.scores],
+         'scores': [{key: known(value) for key, value in vars(score).items()} for score in result.scores],
          'runs': [{key: known(value) for key, value in row.items()} for row in result.rows]} for result in results]}
     return json.dumps(document, indent=1, ensure_ascii=False) + '\n'
+
+
+def _standing(results: Sequence[Result]) -> Figure:
+    curves = []
+    for number, (name, score) in enumerate(ranked(results)):
+        if not np.isnan(score.excess_mean):
+            curves.append(Curve(0, name, run_style(number), np.array([max(score.variation_median_Nm, 1.0)]),
+                                np.array([max(100.0 * score.excess_mean, 0.1)]), drawn='markers',
+                                marker=_MARKERS[number // STYLES % len(_MARKERS)], legend=name, group=name))
+    label = Label.plain('torque variation in the median, N m')
+    return Figure('standing', 'Distance and what it costs the brake', label,
+                  [Panel(Label.plain('mean excess, %'), curves, height_px=360.0, log=True)],
+                  caption='Braking distance over the causal optimum, and the variation of the commanded torque in a stop. '
+                          'Lower left is better.')
+
+
+def _shares(results: Sequence[Result]) -> Figure:
+    by_name = {result.entry.label: result for result in results}
+    curves = []
+    for number, (name, _) in enumerate(ranked(results)):
+        excess = np.array([row['excess'] for row in by_name[name].rows])
+        excess = np.sort(np.where(np.isnan(excess), np.inf, excess))
+        share = 100.0 * (np.arange(len(excess)) + 1.0) / len(excess)
+        seen = excess <= _MOST_EXCESS
+        curves.append(Curve(0, name, run_style(number), 100.0 * excess[seen], share[seen], legend=name, group=name))
+    return Figure('shares', 'Share of the runs', Label.plain('excess, %'),
+                  [Panel(Label.plain('share of the runs within it, %'), curves, height_px=320.0, y_range=(0.0, 100.0))],
+                  caption='How many runs stop within an excess of the causal optimum. Runs that fail stay out of reach.',
+                  x_range=(0.0, 100.0 * _MOST_EXCESS))
+
+
+def html(results: Sequence[Result], whole: bool) -> str:
+    """Raises Unavailable without plotly.js."""
+    figures = [_standing(results), _shares(results)]
+    header = ['controller', *HEADINGS]
+    groups = [(score.group, Table(f'group-{score.group}', header, cells(results, score.group)))
+              for score in results[0].scores[:-1]]
+    worst = Table('worst', ['controller', 'worst case', 'excess %'],
+                  [[name, score.worst_case, '–' if np.isnan(score.excess_worst) else f'{100.0 * score.excess_worst:.1f}']
+                   for name, score in ranked(results)])
+    return render('benchmark.html.j2', figures, _FOLDER, version=_core.version, title=title(whole),
+                  all=Table('all', header, cells(results)), groups=groups, worst=worst,
+                  settings=[(result.entry.label, ', '.join(f'{key} = {value}' for key, value in result.entry.settings.items()))
+                            for result in results if result.entry.settings],
+                  figures=[view(figure) for figure in figures])

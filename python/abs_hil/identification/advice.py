@@ -55,7 +55,7 @@ def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[
     """The experiments, best first. Simulates each on the identified plant."""
     fit = found.fit
     free = fit.free
-    present = (fit.information() + np.diag(fit.prior()[0]))[np.ix_(free, free)]
+    present = (fit.normal.sum(axis=0) + np.diag(fit.prior()[0]))[np.ix_(free, free)]
     before = np.sqrt(np.diag(np.linalg.inv(present)))
     keys = [key for key, one in zip(fit.keys, free) if one]
     disturbances = QUIET if found.disturbances is None else found.disturbances

@@ -12,6 +12,7 @@ with c, k, q and h follows from how they change with the torque, and with d from
 lag itself has the rate c31, times the release ratio where the torque falls.
 """
 import dataclasses
+import itertools
 from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
@@ -73,7 +74,8 @@ def amounts(log: Log, motion: Motion, values: Mapping[str, float], flaws: Collec
     static, torque = static_torques(log, values), brake_torques(log, values)
     grows: dict[str, Callable[[], np.ndarray]] = {
         FADING.key: lambda: -heat_J(log, motion, values),
-        COOLING.key: lambda: _recovered(log, motion, values), HYSTERESIS.key: lambda: fallen(static),
+        COOLING.key: lambda: values.get(FADING.key, 0.0) * leaky(log, values.get(COOLING.key, 0.0), heat_J(log, motion, values)),
+        HYSTERESIS.key: lambda: fallen(static),
         CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
         DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
     return {key: of() for key, of in grows.items() if key in flaws}
@@ -88,11 +90,6 @@ def heat_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
     """E at each row."""
     power = brake_torques(log, values) * np.where(motion.stands[:, 0], 0.0, np.maximum(motion.speed_rad_s[:, 0], 0.0))
     return leaky(log, values.get(COOLING.key, 0.0), power)
-
-
-def _recovered(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
-    """-k dE/dq."""
-    return values.get(FADING.key, 0.0) * leaky(log, values.get(COOLING.key, 0.0), heat_J(log, motion, values))
 
 
 def leaky(log: Log, leaves_per_s: float, comes: np.ndarray) -> np.ndarray:
@@ -121,8 +118,5 @@ def _late(log: Log, target: np.ndarray, dead_s: float) -> np.ndarray:
 
 
 def _hanging(target: np.ndarray, hysteresis: float) -> np.ndarray:
-    held, out = 0.0, []
-    for low, high in zip(((1.0 - hysteresis) * target).tolist(), ((1.0 + hysteresis) * target).tolist()):
-        held = min(max(held, low), high)
-        out.append(held)
-    return np.array(out)
+    ends = zip(((1.0 - hysteresis) * target).tolist(), ((1.0 + hysteresis) * target).tolist())
+    return np.array([*itertools.accumulate(ends, lambda held, end: min(max(held, end[0]), end[1]), initial=0.0)][1:])

@@ -86,11 +86,8 @@ def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     best = int(np.argmin(costs))
     if not costs[best] < without - CLEAR_GAIN:
         return fit
-    limited = dataclasses.replace(problem, with_rate_limit=True)
-    at = [p.key for p in limited.parameters].index(RATE_LIMIT.key)
-    value = SHARES[best] * fastest
-    return fit.copy(problem=limited, values={**fit.values, RATE_LIMIT.key: value},
-                    first={**fit.first, RATE_LIMIT.key: value}, free=np.insert(fit.free, at, True))
+    limit = {RATE_LIMIT.key: SHARES[best] * fastest}
+    return dataclasses.replace(fit.changed(limit, with_rate_limit=True), first={**fit.first, **limit})
 
 
 def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
@@ -119,16 +116,13 @@ def without(fit: Fit) -> Fit:
     """A copy of the fit in which the lag alone holds the brake's torque back."""
     if not fit.problem.with_rate_limit:
         return fit.copy()
-    at = fit.keys.index(RATE_LIMIT.key)
-    return fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
-                    values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))
+    return fit.changed({RATE_LIMIT.key: 0.0}, with_rate_limit=False)
 
 
 def with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
     """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
-    problem = dataclasses.replace(fit.problem, with_delay=True)
-    late = fit.copy(problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0})
-    late.scale = linearise(problem, late.values, late.pieces, check)
+    late = fit.changed({DELAY: 0.0}, with_delay=True)
+    late.scale = linearise(late.problem, late.values, late.pieces, check)
     N, n = keep_normals(late, run_filter(late, QUIET)[1])
     x = solved(late, N, n)[-1]
     if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:

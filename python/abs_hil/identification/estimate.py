@@ -7,7 +7,7 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
-from . import choices, discs, intervals, structure
+from . import choices, intervals, structure
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
 from .linear import run_filter, step
@@ -128,13 +128,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     say(f'{fit.problem.form.meaning}: fit')
     # Without disturbances a fit to the logs of a rig that wanders may go anywhere: the other one begins where this one does.
     undisturbed = _undisturbed(fit.copy(), check, say)
-    quiet = undisturbed is not None and undisturbed.rms_counts <= LARGEST_QUIET_RMS
-    causes: list[structure.Found] = []
-    first_causes: list[structure.Found] = []
-    cost = 0.0
-    if undisturbed is not None and quiet:
-        fit = undisturbed
-    else:
+    if undisturbed is None or not undisturbed.rms_counts <= LARGEST_QUIET_RMS:
         left = f'residual {undisturbed.rms_counts:.3g} counts RMS' if undisturbed is not None else 'no fit without disturbances'
         say(f'{left}: the rig wanders, or the model lacks something')
         try:
@@ -150,14 +144,17 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
                              ) from None
+        disturbances = fit.disturbances
+    else:
+        fit, disturbances, causes, first_causes, cost = undisturbed, QUIET, [], [], 0.0
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
-    fit = choices.settle(fit, QUIET if quiet else fit.disturbances, check)
-    fit, round_discs = discs.settle(fit, QUIET if quiet else fit.disturbances, check)
-    gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
+    fit = choices.settle(fit, disturbances, check)
+    fit, round_discs = intervals.settle_discs(fit, disturbances, check)
+    gaps = likely_u0(fit, disturbances, check)
     say('intervals')
-    spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes, first_causes, cost)
+    spread = intervals.bootstrap(fit, seed, check=check) if disturbances is QUIET else intervals.information(fit)
+    return Finished(fit, spread, gaps, None if disturbances is QUIET else disturbances, round_discs, causes, first_causes, cost)
 
 
 def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:

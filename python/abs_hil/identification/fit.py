@@ -94,8 +94,7 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     inside = [max(0.5 * (begin + end), end - 1e-3) for begin, end in gaps]
     costs = other_costs(fit, disturbances, affected, 'u0', inside, check)
     tried = [(float(begin), float(end), cost) for (begin, end), cost in zip(gaps, costs)]
-    best = min(tried, key=lambda gap: gap[2])
-    fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
+    fit.values['u0'] = float(inside[int(np.argmin(costs))])
     return tried
 
 
@@ -140,11 +139,9 @@ def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], 
 
 def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], None],
              discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
-    values = first_values(problem, start, other_form)
-    values.setdefault(DELAY, 0.0)
-    values.setdefault(RATE_LIMIT.key, problem.fixed.get(RATE_LIMIT.key, 0.0))
-    values.update({key: 1.0 for key in problem.factors})
-    values.update({p.key: 0.0 for p in problem.parameters if p.acts == 'reading'} | dict(discs or {}))
+    values = {DELAY: 0.0, RATE_LIMIT.key: problem.fixed.get(RATE_LIMIT.key, 0.0), **first_values(problem, start, other_form),
+              **dict.fromkeys(problem.factors, 1.0),
+              **{p.key: 0.0 for p in problem.parameters if p.acts == 'reading'}, **(discs or {})}
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
     fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free, dict(values))
     disturbances, count = ROUNDS[0]

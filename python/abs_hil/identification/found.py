@@ -1,11 +1,11 @@
 """What identify() found: estimates with their intervals, statuses and combinations, and which logs disagree."""
 import math
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, Self, TypeGuard
 
 import numpy as np
 
-from . import choices, discs, intervals, structure
+from . import choices, intervals, structure
 from .logs import Log
 from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
@@ -31,6 +31,13 @@ class Estimate:
     high: float | None
     status: str
     unit: str
+
+    @classmethod
+    def normal(cls, value: float, sd: float, unit: str, known: bool | None = None) -> Self:
+        """With the interval of a normal distribution, identified if `known`: else if it is narrow."""
+        known = sd <= LARGEST_SD * abs(value) if known is None else known
+        return cls(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
+                   'identified' if known else 'not-identifiable', unit)
 
     @classmethod
     def fixed(cls, value: float, unit: str) -> Self:
@@ -143,8 +150,8 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             continue
         sd = float(np.sqrt(np.maximum(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
         relative[p.key] = sd / max(abs(value), 1e-300)
-        low, high = value - intervals.WIDTH * sd, value + intervals.WIDTH * sd
-        estimate = Estimate(value, max(low, p.least), min(high, p.most), 'identified', p.unit)
+        reach = intervals.WIDTH * sd
+        estimate = Estimate(value, max(value - reach, p.least), min(value + reach, p.most), 'identified', p.unit)
         if value <= p.least or value >= p.most:
             estimate.status = 'bounded'
             notes.append(f'{p.key} is at its bound {value:g} {p.unit}')
@@ -158,23 +165,18 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
         parameters[RATE_LIMIT.key] = _no_rate_limit(fit, notes, cures)
     parameters.update(_discs(finished, notes))
     for wheel, slots in problem.slots.items():
-        reach = intervals.WIDTH * slots.sd_counts
-        parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate(
-            slots.error_counts, slots.error_counts - reach, slots.error_counts + reach,
-            'identified' if slots.sd_counts <= LARGEST_SD * slots.error_counts else 'not-identifiable', '1')
+        parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate.normal(slots.error_counts, slots.sd_counts, '1')
         notes.append(f'every second edge of the {wheel} encoder comes late by {slots.error_counts:.2g} of a count')
     combinations: dict[str, Estimate] = {}
     for name, (unit, parts, cure) in COMBINATIONS.items():
         if any(part not in parameters for part in parts):
             continue
         value, sd = intervals.combination(fit, spread, name)
-        known = sd <= LARGEST_SD * abs(value)
         worst = max(relative.get(part, 0.0) for part in parts)
         if worst <= UNCERTAIN_PART or 3 * sd > worst * abs(value):
             continue
-        combinations[name] = Estimate(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
-                                      'identified' if known else 'not-identifiable', unit)
-        if known:
+        combinations[name] = Estimate.normal(value, sd, unit)
+        if _known(combinations[name]):
             apart = _run(cure, problem, 'to part them, ')
             joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
             notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}{apart}')
@@ -200,9 +202,8 @@ def _told_by_no_log(parameters: dict[str, Estimate], notes: list[str]) -> bool:
     """Whether the brake's line crosses zero above the least u0 that the logs allow. Wherever u0 lies below that duty, the
     brake gives nothing there, so the crossing is as good a u0 as any: it is taken."""
     u0, slope, offset = parameters['u0'], parameters.get('b1_Nm'), parameters.get('b2_Nm')
-    if not _known(slope) or not _known(offset) or u0.status == 'fixed' or u0.low is None or u0.high is None:
+    if not (_known(slope) and _known(offset)) or u0.status == 'fixed' or u0.low is None or u0.high is None:
         return False
-    assert slope is not None and offset is not None
     crossing = math.ceil(-offset.value / slope.value * 1e6) / 1e6  # rounded up: the map is not negative there
     if not u0.low < crossing <= u0.high or u0.status == 'identified':
         return False
@@ -233,24 +234,21 @@ def _discs(finished: Finished, notes: list[str]) -> dict[str, Estimate]:
         if wheel not in finished.fit.problem.discs:
             out[name] = Estimate(0.0, 0.0, finished.round_discs.get(wheel), 'bounded', 'rad')
             continue
-        disc = discs.disc(finished.fit, finished.spread, wheel)
-        e, reach = disc.eccentricity_rad, intervals.WIDTH * disc.sd_rad
-        known = disc.sd_rad <= LARGEST_SD * e
-        out[name] = Estimate(e, max(0.0, e - reach), e + reach, 'identified' if known else 'not-identifiable', 'rad')
-        turned = intervals.WIDTH * disc.phase_sd_rad
+        eccentricity_rad, sd_rad, phase_rad, phase_sd_rad = intervals.disc(finished.fit, finished.spread, wheel)
+        e = out[name] = Estimate.normal(eccentricity_rad, sd_rad, 'rad')
+        e.low = max(0.0, eccentricity_rad - intervals.WIDTH * sd_rad)
         phase = f'{wheel}_encoder_phase_rad'
-        if disc.phase_rad is None:
+        if phase_rad is None:
             out[phase] = Estimate(0.0, None, None, 'not-identifiable', 'rad')
             notes.append(f'the {wheel} encoder is eccentric, but its counter began at another place of the disc in each log: so '
                          'no phase is known, and [model] leaves the eccentricity out; control.observer.learn_eccentricity_s '
                          'learns it before a braking')
         else:
-            out[phase] = Estimate(disc.phase_rad, disc.phase_rad - turned, disc.phase_rad + turned,
-                                  'identified' if known else 'not-identifiable', 'rad')
+            out[phase] = Estimate.normal(phase_rad, phase_sd_rad, 'rad', _known(e))
     return out
 
 
-def _known(estimate: Estimate | None) -> bool:
+def _known(estimate: Estimate | None) -> TypeGuard[Estimate]:
     return estimate is not None and estimate.status in ('identified', 'fixed')
 
 
@@ -261,7 +259,7 @@ def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
     smaller, larger = intervals.excluded(gaps)
     if not (smaller or larger):
         return Estimate(value, None, None, 'not-identifiable', '1')
-    low, high = intervals.u0_interval(gaps, fit.values)
+    low, high = intervals.u0_interval(gaps)
     certain = smaller and larger and high - low <= LARGEST_SD * value
     return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
 

@@ -1,15 +1,16 @@
 """Intervals of 95 %: by quantising the fitted motion anew with other encoder phases (parametric bootstrap) where only the
-counts' steps disturb, by the information of the filter where the rig wanders."""
+counts' steps disturb, by the information of the filter where the rig wanders. And what the logs say of eccentric discs."""
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.stats
 
 from ..core import _core
-from .linear import filtered, solved
-from .parameters import COMBINATIONS, WHEELS
-from .problem import QUIET, Fit
+from .linear import filtered, solved, to_rest
+from .parameters import COMBINATIONS, WHEELS, disc_of
+from .problem import QUIET, Disturbances, Fit
 from .slots import middles
 
 REPLICATES = 80
@@ -18,6 +19,8 @@ _BATCH = 20
 WIDTH = 1.96
 #: of a chi-square distribution with one degree of freedom, 95 %
 LIKELY = 3.84
+#: A disc is believed, and one phase for all logs refused, if chance does it less often than this.
+CHANCE = 1e-6
 
 
 @dataclass
@@ -84,13 +87,76 @@ def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:
     return gaps[0][2] > least, gaps[-1][2] > least
 
 
-def u0_interval(gaps: list[tuple[float, float, float]], values: Mapping[str, float]) -> tuple[float, float]:
+def u0_interval(gaps: list[tuple[float, float, float]]) -> tuple[float, float]:
     """From the first to the last gap between duties that is not less likely than the best by 95 %, or that lies beside
     one that was not tried."""
-    if not gaps:
-        return values['u0'], values['u0']
     least = min(gap[2] for gap in gaps) + LIKELY
     kept = [i for i, gap in enumerate(gaps) if gap[2] <= least]
     low = gaps[kept[0] - 1][1] if kept[0] > 0 else gaps[0][0]
     high = gaps[kept[-1] + 1][0] if kept[-1] + 1 < len(gaps) else gaps[-1][1]
     return low, high
+
+
+def _places(fit: Fit, wheel: str) -> np.ndarray:
+    """Of sine and cosine of each log among the parameters, shape (logs, 2)."""
+    keys = fit.keys
+    return np.array([[keys.index(p.key) for p in disc_of(wheel, log)] for log in range(len(fit.problem.logs))])
+
+
+def _information(fit: Fit, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values and covariance of these parameters by the filter's information."""
+    chosen = places.ravel()
+    scale = fit.scale[chosen]
+    values = np.array([fit.values[fit.keys[i]] for i in chosen])
+    return values, fit.covariance()[np.ix_(chosen, chosen)] * np.outer(scale, scale)
+
+
+def settle_discs(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> tuple[Fit, dict[str, float]]:
+    """The fit without the discs that its logs do not show, and the largest eccentricity that each of these may have, from
+    the log that says most (95 %)."""
+    largest: dict[str, float] = {}
+    for wheel in fit.problem.discs:
+        values, covariance = _information(fit, _places(fit, wheel))
+        if scipy.stats.chi2.sf(float(values @ np.linalg.solve(covariance, values)), len(values)) < CHANCE:
+            continue
+        bounds = []
+        for i in range(0, len(values), 2):
+            sd = float(np.sqrt(np.linalg.eigvalsh(covariance[i:i + 2, i:i + 2])[-1]))
+            bounds.append((sd, float(np.hypot(*values[i:i + 2])) + WIDTH * sd))
+        largest[wheel] = min(bounds)[1]
+    if not largest:
+        return fit, largest
+    fit = fit.changed({}, discs=tuple(wheel for wheel in fit.problem.discs if wheel not in largest))
+    fit.values = {key: value for key, value in fit.values.items() if '_disc_' not in key or key in fit.keys}
+    to_rest(fit, disturbances, 4, check)
+    return fit, largest
+
+
+def disc(fit: Fit, spread: Spread, wheel: str) -> tuple[float, float, float | None, float]:
+    """All logs together: eccentricity and phase, rad, each with its standard deviation. The phase is None if the logs do not
+    agree on one: their counters began at different places of the disc."""
+    places = _places(fit, wheel)
+    values, covariance = _information(fit, places)
+    logs = len(places)
+    chosen = places.ravel()
+    scattered = spread.covariance[np.ix_(chosen, chosen)] * np.outer(fit.scale[chosen], fit.scale[chosen])
+    same = np.tile(np.eye(2), (logs, 1))
+    weights = np.linalg.solve(covariance, same)
+    weights = weights @ np.linalg.inv(same.T @ weights)  # (2 logs, 2)
+    mean = weights.T @ values
+    left = values - same @ mean
+    misfit = float(left @ np.linalg.solve(covariance, left))
+    if logs == 1 or scipy.stats.chi2.sf(misfit, 2 * logs - 2) > CHANCE:
+        e = float(np.hypot(*mean))
+        spreads = weights.T @ scattered @ weights
+        out, along = mean / e, np.array([-mean[1], mean[0]]) / e
+        return (e, float(np.sqrt(out @ spreads @ out)), float(np.arctan2(mean[1], mean[0])),
+                float(np.sqrt(along @ spreads @ along)) / e)
+    pairs = values.reshape(-1, 2)
+    each = np.hypot(*pairs.T)
+    outward = np.zeros((logs, 2 * logs))
+    for i in range(logs):
+        outward[i, 2 * i:2 * i + 2] = pairs[i] / each[i]
+    weight = np.linalg.solve(outward @ covariance @ outward.T, np.ones(logs))
+    weight /= weight.sum()
+    return float(weight @ each), float(np.sqrt(weight @ outward @ scattered @ outward.T @ weight)), None, np.nan

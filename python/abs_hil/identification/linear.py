@@ -27,14 +27,9 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
               check: Callable[[], None] = lambda: None) -> np.ndarray:
     """Fills `linear` of each piece; returns the scale of the parameters' changes."""
     scale = np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
-    steps = []
-    for i, p in enumerate(problem.parameters):
-        size = 1e-5 * scale[i]
-        if p.key == 'u0':
-            size = _duty_step(problem, values['u0'])
-        if p.key == DELAY:
-            size = 1e-5
-        steps.append(size if values[p.key] + size <= p.most else -size)
+    own = {'u0': _duty_step(problem, values['u0']), DELAY: 1e-5}
+    steps = [own.get(p.key, 1e-5 * one) for p, one in zip(problem.parameters, scale)]
+    steps = [size if values[p.key] + size <= p.most else -size for p, size in zip(problem.parameters, steps)]
     for number in range(len(problem.logs)):
         log, brake = problem.flawed(number, values)
         inputs = log.inputs()
@@ -76,12 +71,12 @@ def by_windows(piece: Piece, per_row: np.ndarray) -> np.ndarray:
 def _by_flaws(problem: Problem, values: Mapping[str, float], scale: np.ndarray, piece: Piece, amount: Mapping[str, np.ndarray],
               by_delay: Mapping[str, np.ndarray]) -> None:
     """Derivatives by the brake's flaws, from those by its torque and by a delay. A flaw acts alike within a window."""
-    keys = [p.key for p in problem.parameters]
     torque = _relative(problem, values, scale)[BRAKE_FACTOR, piece.columns]
     lengths = np.diff(piece.first)
     for key in amount:
-        column = int(np.flatnonzero(piece.columns == keys.index(key))[0])
-        share = scale[keys.index(key)] * by_windows(piece, amount[key])
+        i = problem.keys.index(key)
+        column = int(np.flatnonzero(piece.columns == i)[0])
+        share = scale[i] * by_windows(piece, amount[key])
         for name, of in (('by_parameter', np.repeat(share, lengths)), ('end_by_parameter', share)):
             by = by_delay[name] if key == DEAD_TIME.key else piece.linear[name] @ torque
             piece.linear[name][:, :, column] = of[:, None] * by
@@ -90,12 +85,11 @@ def _by_flaws(problem: Problem, values: Mapping[str, float], scale: np.ndarray, 
 def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:
     """Derivatives of the readings by what eccentric discs add. That these change the other derivatives, too, by a
     hundredth at most, is left out: it changes neither where the residuals vanish nor, visibly, an interval."""
-    keys = [p.key for p in problem.parameters]
     place = problem.disc_angles_rad(piece.log, piece.linear['angles'])
     for wheel in problem.discs:
         number = WHEELS.index(wheel)
         for p, wave in zip(disc_of(wheel, piece.log), (np.sin(place[:, number]), np.cos(place[:, number]))):
-            i = keys.index(p.key)
+            i = problem.keys.index(p.key)
             column = int(np.flatnonzero(piece.columns == i)[0])
             piece.linear['by_parameter'][:, number, column] = scale[i] * wave
 
@@ -110,8 +104,7 @@ def measure(problem: Problem, values: Mapping[str, float], piece: Piece, angles:
     residual = np.nan_to_num(angle)[:, :, None] - read
     weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
     gap = np.zeros((*piece.states.shape, len(ends)))
-    for column, end in enumerate(ends):
-        gap[:-1, :, column] = end[:-1] - piece.states[1:]
+    gap[:-1] = np.stack(ends, axis=2)[:-1] - piece.states[1:, :, None]
     linear.update(read=read, residual=residual, weight=weight, gap=gap, stands=piece.stands, first=piece.first,
                   prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
     linear.update(_core.condense(linear))
@@ -137,11 +130,10 @@ def _duty_step(problem: Problem, u0: float) -> float:
 def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
     """What each disturbance does, as scaled changes of the parameters: shape (5, parameters). A factor moves a parameter by
     its own value (b2 may be smaller than its scale)."""
-    keys = [p.key for p in problem.parameters]
-    out = np.zeros((5, len(keys)))
+    out = np.zeros((5, len(problem.keys)))
     for row, names in enumerate((problem.form.road, ('b1_Nm', 'b2_Nm'), ('motor_stall_torque_Nm',), ('M10_Nm',), ('M20_Nm',))):
         for name in names:
-            i = keys.index(name)
+            i = problem.keys.index(name)
             out[row, i] = (values[name] if row < 3 else 1.0) / scale[i]
     return out
 
@@ -149,12 +141,13 @@ def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) 
 def run_filter(fit: Fit, disturbances: Disturbances) -> tuple[float, list[Any]]:
     """-2 log likelihood but for a constant at the best parameters, and what `_core.filter_pieces` gave."""
     found = filtered(fit, fit.pieces, disturbances)
-    N = sum(one[0] for one in found)
-    n = sum(one[1][:, 0] for one in found)
-    c = sum(float(one[2][0]) for one in found)
-    log_variance = sum(one[3] for one in found)
-    x = solved(fit, N, n)
-    return c - float(n @ x) + log_variance, found
+    N, n, square, log_variance = summed(found)
+    return float(square[0] - n[:, 0] @ solved(fit, N, n[:, 0]) + log_variance), found
+
+
+def summed(found: Sequence[Any]) -> list[np.ndarray]:
+    """Over all pieces: the normal equations, squares and logarithms of variances that `filtered` gave."""
+    return [np.asarray(sum(part)) for part in zip(*(one[:4] for one in found))]
 
 
 def filtered(fit: Fit, pieces: Sequence[Piece], disturbances: Disturbances) -> list[Any]:
@@ -165,8 +158,7 @@ def filtered(fit: Fit, pieces: Sequence[Piece], disturbances: Disturbances) -> l
     for piece in pieces:
         at = piece.columns
         N, n, square, log_variance, readings = _core.filter_pieces(
-            [piece.linear], np.ascontiguousarray(way[:, at]), disturbances.sd, disturbances.time_constant_s,
-            fit.problem.variance_rad2)[0]
+            [piece.linear], way[:, at], disturbances.sd, disturbances.time_constant_s, fit.problem.variance_rad2)[0]
         whole, right = np.zeros((size, size)), np.zeros((size, n.shape[1]))
         whole[np.ix_(at, at)], right[at] = N, n
         out.append((whole, right, square, log_variance, readings))
@@ -210,8 +202,7 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     values = np.array([fit.values[p.key] for p in problem.parameters])
     # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
     sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
-    least = np.array([p.least for p in problem.parameters])
-    most = np.array([p.most for p in problem.parameters])
+    least, most = np.array([(p.least, p.most) for p in problem.parameters]).T
     with np.errstate(divide='ignore', invalid='ignore'):
         low = np.where(sizes, np.log(np.maximum(least, 1e-12) / values), (least - values) / fit.scale)
         high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
@@ -261,11 +252,11 @@ def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | N
 def slopes(fit: Fit, disturbances: Disturbances, found: Sequence[Any]) -> np.ndarray:
     """Of the -2 log likelihood of `run_filter`, which gave `found`: by the logarithms of the disturbances' sizes and of
     their times, shape (2, 5). At the best parameters these need not follow."""
-    x = solved(fit, np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found)))
+    N, n, *_ = summed(found)
+    x = solved(fit, N, n[:, 0])
     way = _relative(fit.problem, fit.values, fit.scale)
-    return np.asarray(sum(_core.slopes(piece.linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]),
-                                       disturbances.sd, disturbances.time_constant_s, fit.problem.variance_rad2)
-                          for piece in fit.pieces))
+    return np.asarray(sum(_core.slopes(piece.linear, x[piece.columns], way[:, piece.columns], disturbances.sd,
+                                       disturbances.time_constant_s, fit.problem.variance_rad2) for piece in fit.pieces))
 
 
 def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -306,15 +297,14 @@ def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
     way = _relative(problem, fit.values, fit.scale)
     square = weights = 0.0
     for piece in fit.pieces:
-        linear = dict(piece.linear)
         # The states are near already. A wide prior would only lose digits in the backward pass.
-        linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
-        change, left = _core.smooth(linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]), disturbances.sd,
+        linear = {**piece.linear, 'prior_sd': np.minimum(piece.prior_sd, NEAR_SD)}
+        change, left = _core.smooth(linear, x[piece.columns], way[:, piece.columns], disturbances.sd,
                                     disturbances.time_constant_s, problem.variance_rad2)
         square += left
         weights += float(linear['readings'][:, 1].sum())
-        speeds = change[:, 2:4]
-        piece.states = piece.states + np.column_stack([change[:, :2], np.clip(speeds, -30, 30), change[:, 4:5]])
+        change[:, 2:4] = np.clip(change[:, 2:4], -30, 30)
+        piece.states = piece.states + change[:, :5]
         piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))
         piece.states[:, 4] = np.maximum(piece.states[:, 4], 0.0)
     fit.rms_counts = float(np.sqrt(square / max(weights, 1e-9))) / problem.radians_per_count

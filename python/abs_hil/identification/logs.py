@@ -83,13 +83,9 @@ def load_log(path: PathLike | Run) -> Log:
         content = b''.join(np.ascontiguousarray(path.columns[name]).tobytes() for name in NEEDED if name in path.columns)
         return _log(pathlib.Path(path.folder or experiment or 'run'), path.columns, list(path.notes), content, experiment)
     place = pathlib.Path(path)
-    if place.is_dir() or place.suffix == '.lcmlog':
-        columns, notes, content, experiment = _from_run(place)
-    else:
-        columns, notes, content = _from_csv(place)
-        experiment = ''
+    read = (_from_run if place.is_dir() or place.suffix == '.lcmlog' else _from_csv)(place)
     try:
-        return _log(place, columns, notes, content, experiment)
+        return _log(place, *read)
     except ValueError as error:
         raise ValueError(f'"{place}": {error}') from None
 
@@ -104,18 +100,14 @@ def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
     return columns, notes, content, str(run.summary.get('experiment') or '')
 
 
-def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes]:
+def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
     import pandas
     try:
         content = place.read_bytes()
     except OSError as error:
         raise ValueError(f'cannot read "{place}": {error.strerror}') from None
-    notes: list[str] = []
-    text = content
-    if content[:2] == b'\x1f\x8b':
-        text, cut = _unzipped(content)
-        if cut:
-            notes.append(f'"{place}" is cut off; its readable part is used')
+    text, cut = _unzipped(content) if content[:2] == b'\x1f\x8b' else (content, False)
+    notes = [f'"{place}" is cut off; its readable part is used'] if cut else []
     if not text.endswith(b'\n') and b'\n' in text:
         last = text.rindex(b'\n') + 1
         if text[last:].count(b',') != text[:text.index(b'\n')].count(b','):
@@ -132,7 +124,7 @@ def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
     if short:
         raise ValueError(f'"{place}": row {short} has {lines[short].count(b",") + 1} fields instead of {lines[0].count(b",") + 1}')
     frame.columns = [name.strip() for name in frame.columns]
-    return {str(name): frame[name].to_numpy() for name in frame.columns}, notes, content
+    return {str(name): frame[name].to_numpy() for name in frame.columns}, notes, content, ''
 
 
 def _unzipped(content: bytes) -> tuple[bytes, bool]:
@@ -174,9 +166,7 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
                          f'most {LONGEST_PERIOD_S} s apart')
     counts = np.stack([numbers['upper_counts'], numbers['lower_counts']], axis=1)
     counts[unread] = np.nan
-    late = np.zeros((len(time_s), 2))
-    if 'sample_time_s' in columns:
-        late[:] = np.nan_to_num(np.asarray(columns['sample_time_s'], dtype=float) - time_s)[:, None]
+    late = np.nan_to_num(np.asarray(columns.get('sample_time_s', time_s), dtype=float) - time_s)[:, None].repeat(2, axis=1)
     first_counts = np.array([counts[np.isfinite(counts[:, wheel]), wheel][:1].sum() for wheel in range(2)])
     counts = np.stack([_unwrapped(counts[:, wheel]) for wheel in range(2)], axis=1)
     for wheel, name in enumerate(('upper_counts', 'lower_counts')):
@@ -193,10 +183,8 @@ def _unwrapped(counts: np.ndarray) -> np.ndarray:
     known = np.isfinite(counts)
     if known.sum() < LEAST_ROWS:
         raise ValueError(f'only {int(known.sum())} readings of a wheel are valid; give at least {LEAST_ROWS}')
-    steps = np.diff(counts[known])
-    steps = (steps + 2.0**31) % 2.0**32 - 2.0**31
     out = np.full(len(counts), np.nan)
-    out[known] = np.concatenate([[0.0], np.cumsum(steps)])
+    out[known] = np.unwrap(counts[known] - counts[known][0], period=2.0**32)
     return out
 
 
@@ -234,9 +222,8 @@ def motion_of(log: Log, counts_per_rev: int) -> Motion:
         speed[:, wheel] = np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2, deriv=1, delta=delta))
         angle[:, wheel] = np.where(known, filled, np.nan) - log.read_late_s[:, wheel] * speed[:, wheel]
         weight[:, wheel] = np.where(known, _weights(np.where(known, counts, -1e18)), 0.0)
-        moved = scipy.ndimage.maximum_filter1d(filled, 2 * around + 1) != scipy.ndimage.minimum_filter1d(
-            filled, 2 * around + 1)
-        stands[:, wheel] = ~moved
+        stands[:, wheel] = (scipy.ndimage.maximum_filter1d(filled, 2 * around + 1)
+                            == scipy.ndimage.minimum_filter1d(filled, 2 * around + 1))
     return Motion(angle, smooth, speed, weight, stands)
 
 
@@ -252,11 +239,9 @@ def segments_of(log: Log, motion: Motion) -> list[tuple[int, int]]:
     upper, lower = motion.speed_rad_s[:, 0], motion.speed_rad_s[:, 1]
     moves = np.where(log.wheels_apart != 0, np.maximum(upper, lower) > LEAST_FREE_RAD_S, lower > LEAST_ROLLING_RAD_S)
     moves &= ~_being_parted(log)
-    steps = np.diff(log.time_s)
-    breaks = np.flatnonzero((np.diff(log.wheels_apart) != 0) | (steps > 5 * log.period_s)) + 1
-    segments = []
-    for begin, end in zip([0, *breaks], [*breaks, len(log)]):
-        segments += [(begin + a, begin + b) for a, b in stretches(moves[begin:end])]
+    breaks = np.flatnonzero((np.diff(log.wheels_apart) != 0) | (np.diff(log.time_s) > 5 * log.period_s)) + 1
+    segments = [(begin + a, begin + b) for begin, end in zip([0, *breaks], [*breaks, len(log)])
+                for a, b in stretches(moves[begin:end])]
     return [(a, b) for a, b in segments if log.time_s[b - 1] - log.time_s[a] >= LEAST_SEGMENT_S]
 
 

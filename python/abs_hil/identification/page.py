@@ -36,40 +36,28 @@ def _log_figures(found: Identified) -> list[Figure]:
                   for i, name in enumerate(('upper wheel', 'lower wheel'))]
         duties = [Curve(0, name, run_style(i + 2), *_thinned(log.time_s, values), legend=name, group=name)
                   for i, (name, values) in enumerate((('brake', log.brake_pwm), ('motor', log.motor_pwm)))]
-        residuals = []
-        for i, name in enumerate(('upper wheel', 'lower wheel')):
-            time, left = [], []
-            for piece in fit.pieces:
-                if piece.log == number:
-                    time.append(log.time_s[piece.rows])
-                    left.append(np.where(piece.linear['weight'][:, i] > 0, piece.linear['residual'][:, i, 0]
-                                         / fit.problem.radians_per_count, np.nan))
-            if time:
-                residuals.append(Curve(0, f'residual, {name}', run_style(i),
-                                       *_thinned(np.concatenate(time), np.concatenate(left)), group=name))
+        pieces = [piece for piece in fit.pieces if piece.log == number]
+        rows = np.concatenate([np.empty(0, dtype=int), *(np.arange(len(log))[piece.rows] for piece in pieces)])
+        weight = np.concatenate([np.empty((0, 2)), *(piece.linear['weight'] for piece in pieces)])
+        left = np.concatenate([np.empty((0, 2)), *(piece.linear['residual'][:, :, 0] for piece in pieces)])
+        left /= fit.problem.radians_per_count
+        shown_left = np.where(weight > 0, left, np.nan)
+        residuals = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
+                     for i, name in enumerate(('upper wheel', 'lower wheel')) if pieces]
         figures.append(Figure(
             f'log-{number + 1}', log.name, Label('time, s', 'time, s'),
             [Panel(Label('speed, rad/s', 'speed, rad/s'), speeds, height_px=150.0),
              Panel(Label('duty', 'duty'), duties, height_px=90.0),
              Panel(Label('residual, counts', 'residual, counts'), residuals, height_px=110.0)],
-            caption=f'{len(log)} rows; residual by phase: {_by_phase(found, number)}.', axis=f'log-{number + 1}',
+            caption=f'{len(log)} rows; residual by phase: {_by_phase(log.phase[rows], weight, left)}.', axis=f'log-{number + 1}',
             shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)]))
     return figures
 
 
-def _by_phase(found: Identified, number: int) -> str:
-    fit, log = found.fit, found.logs[number]
-    sums: dict[str, list[float]] = {}
-    for piece in fit.pieces:
-        if piece.log != number:
-            continue
-        square = (piece.linear['weight'] * (piece.linear['residual'][:, :, 0] / fit.problem.radians_per_count)**2)
-        for phase in dict.fromkeys(log.phase[piece.rows]):
-            rows = log.phase[piece.rows] == phase
-            entry = sums.setdefault(str(phase) or 'all', [0.0, 0.0])
-            entry[0] += float(square[rows].sum())
-            entry[1] += float(piece.linear['weight'][rows].sum())
-    return ', '.join(f'{phase} {np.sqrt(square / weight):.3f}' for phase, (square, weight) in sums.items() if weight)
+def _by_phase(phases: np.ndarray, weight: np.ndarray, left: np.ndarray) -> str:
+    parts = [(str(phase) or 'all', phases == phase) for phase in dict.fromkeys(phases)]
+    return ', '.join(f'{phase} {np.sqrt(np.average(left[rows]**2, weights=weight[rows])):.3f}' for phase, rows in parts
+                     if weight[rows].any())
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -129,9 +129,8 @@ def base_options(form: Form, start: PathLike) -> Any:
                              'plant.ideal_sensors': False, 'plant.max_step_s': 1e-3}
     # Flaws of brake, tyre and encoders that are estimated, or that no form of the plant has.
     given.update({f'plant.{flaw.key}': flaw.none for flaw in (RATE_LIMIT, *FLAWS)} | {'plant.encoder_eccentricity_rad': 0.0})
-    for wheel in WHEELS:
-        given.update({f'plant.{wheel}_encoder_{flaw}': 0 for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts',
-                                                                      'lost_counts')})
+    given.update({f'plant.{wheel}_encoder_{flaw}': 0 for wheel in WHEELS
+                  for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts', 'lost_counts')})
     given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing',
                                                            'lower_bearing')})
     return _core.PlantOptions(options(plant=start, set=given))

@@ -107,6 +107,10 @@ class Problem:
         flaws = tuple(flaw for flaw in FLAWS if flaw.key in self.flaws)
         return self.form.parameters + limit + factors + flaws + discs + delay
 
+    @property
+    def keys(self) -> list[str]:
+        return [p.key for p in self.parameters]
+
     def columns(self, log: int) -> np.ndarray:
         """Places of the parameters that act in one log."""
         others = {p.key for other in range(len(self.logs)) if other != log for wheel in self.discs
@@ -179,12 +183,15 @@ class Fit:
         """A fit that can go on without this one."""
         return dataclasses.replace(self, **{'pieces': [dataclasses.replace(piece) for piece in self.pieces], **changes})
 
+    def changed(self, values: Mapping[str, float], **problem: Any) -> Self:
+        """A copy for a problem that is changed: with `values` of its new parameters, which are free, and without old ones."""
+        changed, before = dataclasses.replace(self.problem, **problem), dict(zip(self.keys, self.free))
+        free = np.array([before.get(key, True) for key in changed.keys])
+        return self.copy(problem=changed, values={**self.values, **values}, free=free)
+
     @property
     def keys(self) -> list[str]:
-        return [p.key for p in self.problem.parameters]
-
-    def information(self) -> np.ndarray:
-        return np.asarray(self.normal.sum(axis=0))
+        return self.problem.keys
 
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the scaled changes: the precision (n,), and its product with the way to the first values (n,)."""
@@ -198,7 +205,7 @@ class Fit:
         """Of the parameters' scaled changes, (n, n), with the prior; zeros for those that are not free."""
         free = np.ix_(self.free, self.free)
         out = np.zeros((len(self.free), len(self.free)))
-        out[free] = inverse((self.information() + np.diag(self.prior()[0]))[free])
+        out[free] = inverse((self.normal.sum(axis=0) + np.diag(self.prior()[0]))[free])
         return out
 
 

@@ -10,7 +10,7 @@ from typing import TextIO
 
 from ..core import _core
 from ..files import make_folder, refuse_existing, write_text, write_whole
-from ..options import whole
+from ..options import failed, whole
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import identify
@@ -168,14 +168,11 @@ def main(arguments: list[str]) -> int:
     try:
         return _identify(o)
     except Unavailable as error:
-        print(f'abs_identify: {error}; --no-report leaves the page out', file=sys.stderr)
-        return 3
+        return failed('abs_identify', f'{error}; --no-report leaves the page out', 3)
     except (ValueError, OSError) as error:
-        print(f'abs_identify: {clean(error, 4000)}', file=sys.stderr)
-        return 2
+        return failed('abs_identify', clean(error, 4000))
     except KeyboardInterrupt:
-        print('abs_identify: interrupted; nothing is written', file=sys.stderr)
-        return INTERRUPTED
+        return failed('abs_identify', 'interrupted; nothing is written', INTERRUPTED)
     finally:
         for folder in made:
             with contextlib.suppress(OSError):  # it holds results

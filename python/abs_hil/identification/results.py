@@ -23,7 +23,6 @@ _OF_THE_START = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
 
 
 def as_json(found: Identified) -> dict[str, Any]:
-    """The content of identified.json."""
     def row(estimate: Estimate) -> dict[str, Any]:
         return {'value': estimate.value, 'low': estimate.low, 'high': estimate.high, 'status': estimate.status}
     return {'parameters': {name: row(e) for name, e in {**found.parameters, **found.combinations}.items()},
@@ -44,9 +43,8 @@ def as_json(found: Identified) -> dict[str, Any]:
 
 def as_toml(found: Identified) -> str:
     """The content of model.toml: a plant's file, which --model and --plant load."""
-    def line(key: str, estimate: Estimate) -> str:
-        _, interval = shown(estimate)
-        return f'{key} = {_number(estimate.value)}  # {estimate.unit}: {estimate.status}' + (interval and ', ' + interval)
+    def line(key: str, e: Estimate) -> str:
+        return f'{key} = {_number(e.value)}  # {e.unit}: ' + ', '.join(filter(None, (e.status, shown(e)[1])))
 
     form = found.fit.problem.form
     base = found.fit.problem.base.values()
@@ -140,12 +138,8 @@ def validate(found: Identified, run: Run) -> dict[str, Any]:
     config = run.config
     settings = {key: value for key, value in config.items() if key.startswith(_DOING) and key not in _LEFT_OUT}
     known = {row['name'] for row in _core.keys(options())}
-    for key, value in config.items():  # what the controllers believed, and not the plant that is identified
-        name = key.partition('.')[2]
-        if key.startswith('plant.') and f'model.{name}' in known:
-            settings.setdefault(f'model.{name}', config.get(f'model.{name}', value))
-        if key.startswith('model.'):
-            settings[key] = value
+    for part in ('plant.', 'model.'):  # what the controllers believed, and not the plant that is identified
+        settings.update({f'model.{key.removeprefix(part)}': value for key, value in config.items() if key.startswith(part)})
     settings.update(plant_settings(found))
     settings = {key: value for key, value in settings.items() if value is not None and key in known}
     predicted = simulate(controller=str(run.summary.get('controller', 'adaptive')),
@@ -168,13 +162,7 @@ def shown(e: Estimate) -> tuple[str, str]:
 
 
 def words(found: Identified) -> list[str]:
-    """A plain table for the terminal."""
     rows: Mapping[str, Estimate] = {**found.parameters, **found.combinations}
     width = max(len(name) for name in rows)
-    lines = []
-    for name, e in rows.items():
-        if name == DELAY and e.value == 0.0:
-            continue
-        value, interval = shown(e)
-        lines.append(f'{name:{width}}  {value:14}  {interval:34}  {e.status}')
-    return lines
+    return ['{:{}}  {:14}  {:34}  {}'.format(name, width, *shown(e), e.status) for name, e in rows.items()
+            if name != DELAY or e.value != 0.0]

@@ -35,10 +35,6 @@ class Slots:
     sd_counts: float
     signs: tuple[int, ...]
 
-    def variances(self, log: int, counts: np.ndarray) -> np.ndarray:
-        """Of readings of the counter of a log, over that of equal slots."""
-        return np.asarray((1.0 + self.signs[log] * self.error_counts * _parity(counts))**2)
-
 
 def slots_of(logs: Sequence[Log], motions: Sequence[Motion], counts_per_rev: int) -> dict[str, Slots]:
     """Those of the wheels whose logs show them: surely, and in each log as the others say."""
@@ -71,7 +67,8 @@ def weighed(logs: Sequence[Log], motions: Sequence[Motion], slots: dict[str, Slo
         weight = motion.weight.copy()
         for wheel, of in slots.items():
             number = WHEELS.index(wheel)
-            weight[:, number] /= of.variances(at, np.nan_to_num(log.counts[:, number]) + log.first_counts[number])
+            parity = _parity(np.nan_to_num(log.counts[:, number]) + log.first_counts[number])
+            weight[:, number] /= (1.0 + of.signs[at] * of.error_counts * parity)**2
         out.append(dataclasses.replace(motion, weight=weight))
     return out
 

@@ -7,6 +7,7 @@ With F eliminated from (1) and (2), over an interval of time,
 which is linear but for u0 and c31; these two are scanned. While the wheels are apart, each has an equation of its own.
 The tyre's parameters then fit the force that the lower wheel felt.
 """
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -99,13 +100,14 @@ def _braked(pieces: _Pieces, logs: Sequence[Log], rest_s: float) -> np.ndarray:
 #: columns of the linear fit
 _LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm',
            'b2_Nm')
+#: the least sizes of those that may be 0
+_FLOORS = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
 
 
 def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
     logs, fixed = problem.logs, problem.fixed
     r1, r2, J2 = value['r1_m'], problem.given['r2_m'], problem.given['J2_kg_m2']
-    n = len(pieces.duration)
-    zero = np.zeros(n)
+    zero = np.zeros(len(pieces.duration))
     turning1, turning2 = pieces.turning.T
     motor = {'motor_stall_torque_Nm': pieces.motor, 'back_emf': -pieces.motor_speed}
     contact, apart = ~pieces.apart, pieces.apart
@@ -142,54 +144,49 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
                                          for key in _LINEAR], axis=1)[rows] for rows, upper_by, lower_by in parts])
     target = np.concatenate([-lower_by * J2 * pieces.dw[rows, 1] for rows, _, lower_by in parts])
 
+    # What the logs do not tell stays near the start: a weak pull, in the size of each parameter.
+    emf = value['motor_stall_torque_Nm'] / value['motor_no_load_speed_rad_s']
+    guess = np.array([{**value, 'back_emf': emf}[key] for key in _LINEAR])
+    free = [i for i, key in enumerate(_LINEAR) if key not in fixed]
+    sizes = np.maximum(np.abs(guess), [_FLOORS.get(key, 1e-6) for key in _LINEAR])[free]
+    pull = 0.02 * np.median(np.abs(pieces.duration)) / (5.0 * sizes)
+
     def fit(u0: float, c31: float) -> tuple[float, np.ndarray]:
         A, y = unbraked.copy(), target
         for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31)):
             A[:, _LINEAR.index(key)] = np.concatenate([upper_by * column[rows] for rows, upper_by, _ in parts])
-        known = {key: value[key] for key in _LINEAR if key in fixed}
-        for key, number in known.items():
-            y = y - A[:, _LINEAR.index(key)] * number
-        free = [i for i, key in enumerate(_LINEAR) if key not in known]
-        A = A[:, free]
-        # What the logs do not tell stays near the start: a weak pull, in the size of each parameter.
-        sizes = np.array([_size(key, value) for key in _LINEAR])[free]
-        guess = np.array([_guess(key, value) for key in _LINEAR])[free]
-        noise = 0.02 * np.median(np.abs(pieces.duration)) * 1.0
-        A_pull, y_pull = np.diag(noise / (5.0 * sizes)), noise / (5.0 * sizes) * guess
-        found, cost = _robust(A, y, A_pull, y_pull)
-        full = np.array([_guess(key, value) for key in _LINEAR])
-        full[free] = found
+        for i in sorted({*range(len(_LINEAR))} - {*free}):
+            y = y - A[:, i] * guess[i]
+        full = guess.copy()
+        full[free], cost = _robust(A[:, free], y, np.diag(pull), pull * guess[free])
         return cost, full
 
-    best: tuple[float, np.ndarray, float, float] | None = None
     u0s, c31s = [value['u0']], [value['c31_per_s']]
+    best = np.inf, guess, value['u0'], value['c31_per_s']
     if 'c31_per_s' not in fixed and len(duties):
         c31s = list(np.geomspace(4.0, 100.0, 12))
     if 'u0' not in fixed and len(duties):
         u0s = sorted({float(u) for u in np.quantile(duties, np.linspace(0, 1, 24))} | {float(duties[0])})
     for round_number in range(3):
-        for u0 in u0s:
-            for c31 in c31s:
-                cost, found = fit(u0, c31)
-                if best is None or cost < best[0]:
-                    best = cost, found, u0, c31
-        assert best is not None
+        for u0, c31 in itertools.product(u0s, c31s):
+            cost, found = fit(u0, c31)
+            if cost < best[0]:
+                best = cost, found, u0, c31
         if len(c31s) > 1:
-            c31s = list(best[3] * np.geomspace(0.8 if round_number == 0 else 0.93, 1.25 if round_number == 0 else 1.07, 5))
+            c31s = list(best[3] * np.geomspace(*((0.93, 1.07) if round_number else (0.8, 1.25)), 5))
         if len(u0s) > 1:
             width = (duties[-1] - duties[0]) / 24 / (4 ** round_number)
             near = duties[(duties > best[2] - width) & (duties < best[2] + width)]
             u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
-    assert best is not None
     linear = dict(zip(_LINEAR, best[1]))
     # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
     brakes = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
     for key in _LINEAR:
         if key in value and key not in fixed and (brakes or key not in ('b1_Nm', 'b2_Nm')):
             value[key] = float(linear[key])
-    for key in ('d1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm'):
+    for key, floor in _FLOORS.items():
         if key not in fixed:
-            value[key] = max(value[key], 0.1 * _size(key, value))
+            value[key] = max(value[key], 0.1 * max(abs(value[key]), floor))
     if 'J1_kg_m2' not in fixed:
         value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
     if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
@@ -198,17 +195,6 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
         value['u0'] = best[2]
     if 'c31_per_s' not in fixed and brakes:
         value['c31_per_s'] = best[3]
-
-
-def _size(key: str, value: Mapping[str, float]) -> float:
-    floors = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
-    return max(abs(_guess(key, value)), floors.get(key, 1e-6))
-
-
-def _guess(key: str, value: Mapping[str, float]) -> float:
-    if key == 'back_emf':
-        return value['motor_stall_torque_Nm'] / value['motor_no_load_speed_rad_s']
-    return value[key]
 
 
 def _robust(A: np.ndarray, y: np.ndarray, A_pull: np.ndarray, y_pull: np.ndarray) -> tuple[np.ndarray, float]:
@@ -239,16 +225,12 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
     force = (value['motor_stall_torque_Nm'] * (pieces.motor - pieces.motor_speed / value['motor_no_load_speed_rad_s'])
              - J2 * pieces.dw[:, 1] - value['d2_Nms_rad'] * pieces.angle[:, 1]
              - value['M20_Nm'] * pieces.turning[:, 1]) / (r2 * pieces.duration)
-    middle1, middle2, torque = [], [], []
+    middles = []
     for number, first, last in pieces.parts:
         motion = problem.motions[number]
-        Tb = brake_torques(problem.logs[number], value)
-        centre = (first + last) // 2
-        w = np.where(motion.stands, 0.0, motion.speed_rad_s)
-        middle1.append(w[centre, 0])
-        middle2.append(w[centre, 1])
-        torque.append(Tb[centre])
-    w1, w2, Tb = (np.concatenate(c)[contact] for c in (middle1, middle2, torque))
+        at_rows = np.column_stack([np.where(motion.stands, 0.0, motion.speed_rad_s), brake_torques(problem.logs[number], value)])
+        middles.append(at_rows[(first + last) // 2])
+    w1, w2, Tb = np.concatenate(middles)[contact].T
     force = force[contact]
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
     lows = np.array([max(p.least, 1e-2 * value[p.key]) for p in tyre])
@@ -264,14 +246,12 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
         # What the force does not tell, as the peak's height in gentle braking, stays near the start.
         return np.concatenate([np.asarray(modelled) - force, 2.0 * (x - x_start)])
 
-    best = None
+    fits = []
     for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes
         x0 = np.log([np.clip(value[p.key] * (factor if p.key in form.road else 1.0), 1.05 * low, 0.9 * high)
                      for p, low, high in zip(tyre, lows, highs)])
-        fit = scipy.optimize.least_squares(residual, x0, bounds=(np.log(lows), np.log(highs)), loss='soft_l1',
-                                           f_scale=1.0, max_nfev=60)
-        if best is None or fit.cost < best.cost:
-            best = fit
-    assert best is not None
+        fits.append(scipy.optimize.least_squares(residual, x0, bounds=(np.log(lows), np.log(highs)), loss='soft_l1',
+                                                 f_scale=1.0, max_nfev=60))
+    best = min(fits, key=lambda fit: fit.cost)
     for p, number in zip(tyre, np.clip(np.exp(best.x), lows, highs)):
         value[p.key] = float(number)

@@ -6,7 +6,6 @@ direction of its duty, a speed, an angle. For each such cause the plant's deriva
 follow, are one more column of the fit. Its coefficient c and standard deviation s come from the same filter, with the
 disturbances as noise and all parameters free: |c| / s is about 1 for a rig that wanders at random, whatever the cause.
 """
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -111,11 +110,9 @@ class Found:
 
 def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
     """Each cause that the problem has no parameter for, alone, surest first. Linearises a copy of the fit."""
-    if fit.problem.with_delay:
-        wide = fit.copy()
-    else:
-        wide = fit.copy(problem=dataclasses.replace(fit.problem, with_delay=True), values={**fit.values, DELAY: 0.0},
-                        free=np.append(fit.free, False))
+    wide = fit.changed({}, with_delay=True)
+    if not fit.problem.with_delay:
+        wide.values[DELAY], wide.free[-1] = 0.0, False
     wide.scale = linearise(wide.problem, wide.values, wide.pieces)
     causes = [one for one in CAUSES if one.flaw not in wide.problem.flaws]
     precision, towards = wide.prior()
@@ -156,7 +153,6 @@ def _gain(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> t
 
 
 def _signals(fit: Fit) -> list[Signals]:
-    """Of each log."""
     problem, values = fit.problem, fit.values
     out = []
     for number, motion in enumerate(problem.motions):
@@ -196,11 +192,11 @@ def _normals(fit: Fit, disturbances: Disturbances,
         rows = np.repeat(share, np.diff(piece.first), axis=0)
         for name, of in (('by_parameter', rows), ('end_by_parameter', share)):
             more = linear[name] @ directions[at] * of[:, None, :]
-            linear[name] = np.ascontiguousarray(np.concatenate([linear[name], more], axis=2))
+            linear[name] = np.concatenate([linear[name], more], axis=2)
         linear.update(_core.condense(linear))
         wider = np.concatenate([way[:, at], np.zeros((len(way), sum(widths)))], axis=1)
         part, right, square, log_variance, _ = _core.filter_pieces(
-            [linear], np.ascontiguousarray(wider), disturbances.sd, disturbances.time_constant_s, problem.variance_rad2)[0]
+            [linear], wider, disturbances.sd, disturbances.time_constant_s, problem.variance_rad2)[0]
         cost += float(square[0]) + log_variance
         own = [one[width * piece.log:][:width] if width > 1 else one for one, width in zip(places, widths)]
         place = np.concatenate([at, *own])
@@ -231,10 +227,8 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
         if not one.flaw or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
             continue
         flawed = _with_flaw(fit, one, disturbances, check)
-        if flawed is None:
-            continue
-        if one is surest or all(other.cause is not surest.cause or other.sure < STILL_THERE * surest.sure
-                                for other in causes_of(flawed, disturbances)):
+        if flawed is not None and (one is surest or all(other.cause is not surest.cause or other.sure < STILL_THERE * surest.sure
+                                                        for other in causes_of(flawed, disturbances))):
             return flawed, one.cause
     return None
 
@@ -243,11 +237,9 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     """The fit with one more flaw; None if it is not there after all: not sure by the likelihood, or against what logs that
     are left out say."""
     key = found.flaw
-    problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
-    at = [p.key for p in problem.parameters].index(key)
-    flaw = problem.parameters[at]
+    flaw = next(flaw for flaw in FLAWS if flaw.key == key)
     value = min(flaw.none + found.coefficient, 0.9 * flaw.most)
-    flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
+    flawed = fit.changed({key: value}, flaws=(*fit.problem.flaws, key))
     less = disturbances.times(found.share)
     to_rest(flawed, less, 6, check)
     with_it, without = _against(flawed, less, key), min(_against(fit, disturbances.times(share)) for share in {1.0, found.share})

@@ -2,7 +2,6 @@
 (docs/interchange.md)."""
 import argparse
 import pathlib
-import sys
 import zipfile
 from typing import Any
 from xml.etree import ElementTree
@@ -10,6 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..core import _core
 from ..files import refuse_existing, write_whole
+from ..options import failed
 from ..places import place_of
 
 #: the libraries in an FMU: folder and file as this package has them, folder by FMI 2 and 3
@@ -118,8 +118,8 @@ def description(model: dict[str, Any], fmi: int) -> bytes:
 
 def write(model: dict[str, Any], fmi: int, path: pathlib.Path) -> list[str]:
     """Writes the FMU, complete or not at all. Returns the platforms that it works on."""
-    libraries = [(folder, FOLDER / folder / (IDENTIFIER + ending), names[fmi - 2]) for folder, ending, *names in PLATFORMS]
-    libraries = [row for row in libraries if row[1].exists()]
+    libraries = [(folder, library, names[fmi - 2]) for folder, ending, *names in PLATFORMS
+                 if (library := FOLDER / folder / (IDENTIFIER + ending)).exists()]
     if not libraries:
         raise ValueError(f'"{FOLDER}" holds no library for FMUs; build the target abs_hil_fmu, or install abs_hil again')
     start = ''.join(f'{v["name"]}={v["start"]}\n' for v in model['variables'] if v['causality'] == 'parameter')
@@ -161,8 +161,7 @@ def main(arguments: list[str]) -> int:
         model = _core.fmu_model({name: value for name, value in given.items() if value is not None})
         platforms = write(model, o.fmi, o.out)
     except (ValueError, OSError) as error:
-        print(f'abs_hil export-fmu: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_hil export-fmu', error)
     print(f'{model["name"]}: FMI {o.fmi}.0 co-simulation, {len(model["variables"])} variables, step {model["step_s"]:g} s, for '
           f'{", ".join(platforms)}')
     return 0

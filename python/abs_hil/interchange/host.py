@@ -7,6 +7,7 @@ import traceback
 from typing import Any
 
 from ..core import load_network
+from ..options import failed
 
 
 def made(name: str) -> Any:
@@ -40,7 +41,6 @@ def main(arguments: list[str]) -> int:
     try:
         os.fstat(3)
     except OSError:
-        print('abs_python_host: abs_hil starts this program by itself, for --controller MODULE:CLASS', file=sys.stderr)
-        return 2
+        return failed('abs_python_host', 'abs_hil starts this program by itself, for --controller MODULE:CLASS')
     sys.stdout = sys.stderr  # as run_host does, but whole lines come out at once: this process may end at any time
     return load_network('a controller in Python').serve_controller(_parts)

@@ -27,8 +27,6 @@ int32 sec
 uint32 nanosec
 """
 CHUNK_BYTES = 1 << 20
-#: levels of that message
-INFO, WARNING, ERROR = 20, 30, 40
 
 
 def field_names(columns: Iterable[str]) -> dict[str, str]:
@@ -58,12 +56,10 @@ def rows(columns: Sequence[np.ndarray]) -> list[bytes]:
 
 
 def row(values: Sequence[float]) -> bytes:
-    """One message of a flat struct."""
     return _LITTLE_ENDIAN + struct.pack(f'<{len(values)}d', *values)
 
 
 def log(stamp_ns: int, level: int, name: str, text: str) -> bytes:
-    """A message of the type LOG_TYPE."""
     body = struct.pack('<iIB', stamp_ns // 1_000_000_000, stamp_ns % 1_000_000_000, level)
     for word in (name, text, '', ''):
         data = word.encode() + b'\0'
@@ -75,7 +71,7 @@ class Topics:
     """Where messages go, by topic: an MCAP file, or the channels of a server."""
 
     def __init__(self) -> None:
-        self._channels: dict[str, Any] = {}
+        self.channels: dict[str, Any] = {}
 
     def add(self, topic: str, type_name: str, definition: str) -> None:
         raise NotImplementedError
@@ -83,9 +79,6 @@ class Topics:
     def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None:
         """A topic of flat structs from (column, comment) of their fields."""
         self.add(topic, type_name, definition(fields))
-
-    def has(self, topic: str) -> bool:
-        return topic in self._channels
 
     def wants(self, topic: str) -> bool:
         """Whether anybody reads it."""
@@ -95,7 +88,7 @@ class Topics:
         raise NotImplementedError
 
     def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None:
-        if not self.has(topic):
+        if topic not in self.channels:
             self.add(topic, LOG_TYPE, LOG_DEFINITION)
         self.write(topic, time_ns, log(time_ns, level, name, text))
 
@@ -116,11 +109,11 @@ class McapFile(Topics):
 
     def add(self, topic: str, type_name: str, definition: str) -> None:
         schema = self._writer.register_schema(name=type_name, encoding='ros2msg', data=definition.encode())
-        self._channels[topic] = self._writer.register_channel(topic=topic, message_encoding='cdr', schema_id=schema)
+        self.channels[topic] = self._writer.register_channel(topic=topic, message_encoding='cdr', schema_id=schema)
         self._sequence[topic] = 0
 
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
-        self._writer.add_message(channel_id=self._channels[topic], log_time=time_ns, publish_time=time_ns, data=data,
+        self._writer.add_message(channel_id=self.channels[topic], log_time=time_ns, publish_time=time_ns, data=data,
                                  sequence=self._sequence[topic])
         self._sequence[topic] += 1
 

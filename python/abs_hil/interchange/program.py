@@ -2,10 +2,10 @@
 import argparse
 import pathlib
 import signal
-import sys
 from typing import Any
 
 from ..files import write_whole
+from ..options import failed
 from ..places import how_to_install
 
 TARGETS = ('.mcap', '.parquet')
@@ -40,11 +40,9 @@ def main(arguments: list[str]) -> int:
         print(_record(given, output) if given.live is not None else _convert(given.input, output))
         return 0
     except ImportError as error:
-        print(f'abs_convert: {error}: install it: {how_to_install(error.name or "mcap")}', file=sys.stderr)
-        return 3
+        return failed('abs_convert', f'{error}: install it: {how_to_install(error.name or "mcap")}', 3)
     except (ValueError, OSError) as error:
-        print(f'abs_convert: {error}', file=sys.stderr)
-        return 3 if isinstance(error, OSError) else 2
+        return failed('abs_convert', error, 3 if isinstance(error, OSError) else 2)
 
 
 def _convert(path: str, output: pathlib.Path) -> str:

@@ -149,8 +149,7 @@ def _read_log_facts(path: pathlib.Path, source: Source) -> None:
         for number in facts[name][~((facts[name] >= 0) & (facts[name] <= LAST_NUMBER))][:1].tolist():
             raise ValueError(f'{path}: a message has the impossible number {number} among its {name}')
     source.start_ns = max(facts['start_us'], 0) * 1000
-    lost = _gaps(facts['sequences'], 1)
-    if lost:
+    if lost := _gaps(facts['sequences'], 1):
         source.losses.append(f'{lost} messages of telemetry are missing in the log')
     if events_lost := _gaps(facts['event_sequences'], 1):
         source.losses.append(f'{events_lost} events are missing in the log')

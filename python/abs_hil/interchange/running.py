@@ -10,11 +10,9 @@ from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
 from .messages import McapFile, Topics
-from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, LEVELS, SIGNALS_TOPIC, SIGNALS_TYPE, comment
+from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, LAST_NS, LEVELS, SIGNALS_TOPIC, SIGNALS_TYPE, comment
 
 STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
-#: ROS 2's stamps hold no later time
-LAST_NS = (2 ** 31 - 1) * 10 ** 9
 
 
 def received(url: str, prefix: str, idle_s: float | None, seconds: float | None) -> Iterator[tuple[str, Any]]:
@@ -23,9 +21,8 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
     subscription = load_network('abs_hil convert --live').Subscription(url, re.escape(prefix) + '.*')
     begin = time.monotonic()
     heard = None
-    slice_s = 0.2
     while seconds is None or time.monotonic() < begin + seconds:
-        packet = subscription.next(slice_s)
+        packet = subscription.next(0.2)
         now = time.monotonic()
         if packet is None:
             if idle_s is not None and heard is not None and now > heard + idle_s:
@@ -39,8 +36,6 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
 
 
 class Translator:
-    """Puts LCM's messages into topics."""
-
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
         self._topics.add_struct(CYCLE_TOPIC, CYCLE_TYPE, [(name, comment(name)) for name in COLUMNS])
@@ -84,7 +79,7 @@ class Translator:
 
     def _status_t(self, message: Any) -> None:
         values = {name: float(getattr(message, name)) for name in message.__slots__}
-        if not self._topics.has(STATUS_TOPIC):
+        if STATUS_TOPIC not in self._topics.channels:
             self._topics.add_struct(STATUS_TOPIC, STATUS_TYPE,
                                     [(name, comment(name) if name in QUANTITIES else '') for name in values])
         self._topics.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), messages.row(list(values.values())))
@@ -102,9 +97,7 @@ class Recorder(Translator):
         self._mcap = mcap
         self._sequence: dict[str, int] = {}
         self.experiment: Any = None
-        self.rows = 0
-        self.lost = 0
-        self.damaged = 0
+        self.rows = self.lost = self.damaged = 0
 
     def take(self, channel: str, message: Any) -> None:
         if message is None:

@@ -1,10 +1,12 @@
 """Exercises of the lab: what a page says, hides and offers, from a TOML file."""
+import math
 import pathlib
 import re
 import tomllib
 from typing import Any
 
 from ..core import _core
+from ..files import read_text
 from ..messages import QUANTITIES
 from ..simulation import simulate
 
@@ -23,11 +25,7 @@ def known() -> list[pathlib.Path]:
 
 
 def find(name_or_file: str) -> pathlib.Path:
-    """A ready exercise by name, or a file."""
-    for path in known():
-        if path.stem == name_or_file:
-            return path
-    return pathlib.Path(name_or_file)
+    return next((path for path in known() if path.stem == name_or_file), pathlib.Path(name_or_file))
 
 
 def _check(given: dict[str, Any], table: str, place: str) -> None:
@@ -38,6 +36,9 @@ def _check(given: dict[str, Any], table: str, place: str) -> None:
             raise ValueError(f'{place}: unknown key {name}; known: {", ".join(_SHAPE[table])}')
         if not isinstance(value, (int, float) if wanted is float else wanted) or isinstance(value, bool):
             raise ValueError(f'{place}: {name} = {value!r}: give a {"number" if wanted is float else wanted.__name__}')
+        for number in value.values() if isinstance(value, dict) else [value]:
+            if isinstance(number, float) and not math.isfinite(number):
+                raise ValueError(f'{place}: {name} = {value!r}: give finite numbers')
 
 
 def _among(names: list[Any], valid: list[str], key: str, place: str) -> None:
@@ -51,7 +52,7 @@ def read(path: pathlib.Path) -> dict[str, Any]:
     """The exercise as the page takes it. Raises ValueError, naming the file, the value and what is valid."""
     place = str(path)
     try:
-        given = tomllib.loads(path.read_text(encoding='utf-8'))
+        given = tomllib.loads(read_text(path))
     except OSError as error:
         names = ', '.join(exercise.stem for exercise in known())
         raise ValueError(f'--exercise "{path}": {error.strerror}; give a TOML file, or one of {names}') from None
@@ -63,20 +64,19 @@ def read(path: pathlib.Path) -> dict[str, Any]:
             raise ValueError(f'{place}: {needed} is missing; give a text')
     for table in ('start', 'hidden', 'offered'):
         _check(given.get(table, {}), table, place)
-    for goal in given.get('goal', []):
+    goals = given.get('goal', [])
+    for goal in goals:
         _check(goal, 'goal', place)
     start, hidden, offered = ({'set': {}, **given.get(table, {})} for table in ('start', 'hidden', 'offered'))
     figures = [row['name'] for row in _core.figures()]
     keys = [row['name'] for row in _core.keys({})]
-    _among(hidden.get('columns', []), list(QUANTITIES), 'hidden.columns', place)
-    _among(hidden.get('figures', []), figures, 'hidden.figures', place)
-    _among(offered.get('keys', []), keys, 'offered.keys', place)
+    for table, choice, valid in (('hidden', 'columns', QUANTITIES), ('hidden', 'figures', figures), ('offered', 'keys', keys),
+                                 ('offered', 'controllers', _core.controllers()), ('offered', 'plants', _core.plants()),
+                                 ('offered', 'experiments', _core.experiments())):
+        _among(given.get(table, {}).get(choice, []), list(valid), f'{table}.{choice}', place)
     for key in offered.get('keys', []):
         if key in hidden['set']:
             raise ValueError(f'{place}: offered.keys: {key} is in hidden.set too; leave it out of one of the two')
-    for choice, valid in (('controllers', _core.controllers()), ('plants', _core.plants()), ('experiments', _core.experiments())):
-        _among(offered.get(choice, []), list(valid), f'offered.{choice}', place)
-    goals = given.get('goal', [])
     for goal in goals:
         _among([goal.get('figure')], figures, 'goal.figure', place)
         if not goal.get('says') or not {'at_most', 'at_least'} & goal.keys():

@@ -5,12 +5,12 @@ One HTML file: the simulation core as WebAssembly, uPlot, and the page's own scr
 import argparse
 import json
 import pathlib
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 from ..core import _core
 from ..files import write_text
+from ..options import failed
 from ..places import CHARTS_SCRIPT, CHARTS_STYLE, charts
 from ..report.page import Unavailable, standalone
 from .exercise import find, known, read
@@ -46,22 +46,17 @@ def page(exercise: dict[str, Any] | None) -> str:
                       version=_core.version)
 
 
-def _parser() -> argparse.ArgumentParser:
+def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog='abs_hil lab', allow_abbrev=False, description=(__doc__ or '').split(' (docs')[0] + '.')
     parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('lab.html'), help='the page (lab.html)')
     parser.add_argument('--exercise', metavar='FILE',
                         help='a TOML file that says what the page asks, hides and offers; or one that is ready: '
                              + ', '.join(path.stem for path in known()))
-    return parser
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    given = _parser().parse_args(arguments)
+    given = parser.parse_args(arguments)
     try:
         text = page(None if given.exercise is None else read(find(given.exercise)))
         write_text(given.out, text)
     except (ValueError, Unavailable, ImportError) as error:
-        print(f'abs_hil lab: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_hil lab', error)
     print(f'{given.out}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser')
     return 0

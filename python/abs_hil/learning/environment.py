@@ -20,27 +20,24 @@ MOST_STEPS = 1000
 MODES = ('rgb_array',)
 
 
-class EpisodePicture:
-    """Slip and reference, speed, and action over the time of one episode. `begin` and `add` keep its observations."""
+class Braking(gymnasium.Env):
+    """What environments of one rig share: their spaces, and a picture of slip and reference, speed, and action over the time of
+    one episode, whose observations are its `_rows`."""
+
+    metadata: dict[str, Any] = {'render_modes': list(MODES)}
 
     def __init__(self, render_mode: str | None, period_s: float) -> None:
         if render_mode not in (None, *MODES):
             raise ValueError(f'render_mode {render_mode!r}: give one of {", ".join(MODES)}, or None')
-        self._wanted = render_mode is not None
+        self.render_mode = render_mode
+        self.observation_space, self.action_space = observation_space(), action_space()
+        self.metadata = {**self.metadata, 'render_fps': round(1.0 / period_s)}
         self._period_s = period_s
         self._rows: list[np.ndarray] = []
 
-    def begin(self, observation: np.ndarray) -> None:
-        self._rows = []
-        self.add(observation)
-
-    def add(self, observation: np.ndarray) -> None:
-        if self._wanted:
-            self._rows.append(observation)
-
-    def draw(self) -> np.ndarray | None:
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
         """The picture, uint8 of shape (480, 640, 3); None without a render_mode."""
-        if not self._wanted:
+        if self.render_mode is None:
             return None
         try:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -80,7 +77,7 @@ def check_options(options: Mapping[str, Any] | None, *known: str) -> None:
                              'Configuration values go into gymnasium.make(..., set={...})')
 
 
-class SlipControl(gymnasium.Env):
+class SlipControl(Braking):
     """Brake one simulated rig to 3 m/s and keep the wheel's slip at its reference.
 
     Observation, float32 of shape (7,), as the program's controllers get it, from encoder counts:
@@ -105,36 +102,23 @@ class SlipControl(gymnasium.Env):
     render_mode "rgb_array": render() returns the episode so far as a picture, uint8 of shape (480, 640, 3).
     """
 
-    metadata: dict[str, Any] = {'render_modes': list(MODES)}
-
     def __init__(self, plants_seed: int = TRAINING_SEED, render_mode: str | None = None, **task: Any) -> None:
-        self.render_mode = render_mode
-        self.observation_space = observation_space()
-        self.action_space = action_space()
         self._rigs = Rigs(1, Task(**task), seed=plants_seed)
-        self._picture = EpisodePicture(render_mode, self._rigs.task.period_s)
-        self.metadata = {**self.metadata, 'render_fps': round(1.0 / self._rigs.task.period_s)}
-        self._steps = 0
+        super().__init__(render_mode, self._rigs.task.period_s)
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
         """options: {"index": n} chooses plant n of the series."""
         check_options(options, 'index')
         super().reset(seed=seed)
         index = int(options['index']) if options else int(self.np_random.integers(2**31))
-        self._steps = 0
-        observation = self._rigs.reset(0, index)
-        self._picture.begin(observation)
-        return observation, {'index': index}
+        self._rows = [self._rigs.reset(0, index)]
+        return self._rows[0], {'index': index}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         observations, rewards, ended = self._rigs.step(np.asarray(action))
-        self._steps += 1
-        self._picture.add(observations[0])
-        return (observations[0], float(rewards[0]), bool(ended[0]), not ended[0] and self._steps >= MOST_STEPS,
+        self._rows.append(observations[0])
+        return (observations[0], float(rewards[0]), bool(ended[0]), not ended[0] and len(self._rows) > MOST_STEPS,
                 {'true_slip': float(self._rigs.true_slip[0])})
-
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
-        return self._picture.draw()
 
 
 class SlipControlVector(VectorEnv):

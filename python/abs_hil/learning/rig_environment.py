@@ -10,24 +10,23 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from ..options import Value, program, text_of
-from .environment import MODES, EpisodePicture, action_space, check_options, observation_space
+from .environment import Braking, check_options
 from .rigs import CHANGE_PRICE, END_SPEED_M_S, FAULT_REWARD, HIGH, LOW
 
 #: AgentPage of src/interchange/agent_controller.hpp
 MARK = b'absagt01'
 PAGE_BYTES = 4096
-HOLD_AT, ACTION_AT, VERSION_AT, VALUES_AT = 8, 16, 24, 32
+ACTION_AT, VERSION_AT, VALUES_AT = 16, 24, 32
 VALUES = ('time_s', 'slip', 'slip_ref', 'car_speed_m_s', 'alpha1_rad_s2', 'alpha2_rad_s2', 'brake_torque_Nm',
           'max_brake_torque_Nm', 'acting_number', 'late_cycles', 'refused')
 #: how often the page is looked at, s
 LOOK_S = 0.0005
 
 
-class RigSlipControl(gymnasium.Env):
+class RigSlipControl(Braking):
     """Brake a rig in real time, behind the program's command gate and its guardian; on a board or on the simulator.
 
     `reset` starts `abs_hil`, waits until the rig has run up and braking begins: one run-up an episode. `step` gives an action
@@ -46,18 +45,13 @@ class RigSlipControl(gymnasium.Env):
     Raises RuntimeError, with the program's words, if a run cannot begin.
     """
 
-    metadata: dict[str, Any] = {'render_modes': list(MODES)}
-
     def __init__(self, backend: str = 'rig', *, set: Mapping[str, Value] | None = None, arguments: Sequence[str] = (),
                  period_s: float = 0.01, hold_s: float = 0.03, run_up_s: float = 120.0, longest_s: float = 60.0,
                  folder: str | None = None, render_mode: str | None = None) -> None:
         if not 0.0 < period_s <= hold_s <= 1.0:
             raise ValueError(f'period_s {period_s}, hold_s {hold_s}: give 0 < period_s <= hold_s <= 1')
-        self.render_mode = render_mode
-        self._picture = EpisodePicture(render_mode, period_s)
-        self.metadata = {**self.metadata, 'render_fps': round(1.0 / period_s)}
-        self.observation_space, self.action_space = observation_space(), action_space()
-        self._period_s, self._hold_s, self._run_up_s, self._longest_s = period_s, hold_s, run_up_s, longest_s
+        super().__init__(render_mode, period_s)
+        self._hold_s, self._run_up_s, self._longest_s = hold_s, run_up_s, longest_s
         self._own = tempfile.TemporaryDirectory(prefix='abs_hil_agent_')
         self._folder = pathlib.Path(folder or self._own.name)
         self._page = pathlib.Path(self._own.name) / 'page.agent'
@@ -68,9 +62,6 @@ class RigSlipControl(gymnasium.Env):
                          *(word for key, value in values.items() for word in ('--set', f'{key}={text_of(value)}'))]
         self._log = self._folder / 'abs_hil.log'
         self._process: subprocess.Popen[bytes] | None = None
-        self._number = 0
-        self._action = 0.0
-        self._bytes: mmap.mmap
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
         """Ends a run that still goes on, and begins another. The rig draws nothing, so the seed has no effect on it.
@@ -96,9 +87,8 @@ class RigSlipControl(gymnasium.Env):
                 self._end()
                 raise RuntimeError(f'no braking within {self._run_up_s:g} s: raise run_up_s, or see why the rig does not run up')
             time.sleep(LOOK_S)
-        observation = self._observe(self._values())
-        self._picture.begin(observation)
-        return observation, {}
+        self._rows = [self._observe(self._values())]
+        return self._rows[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         asked = float(np.clip(np.asarray(action, dtype=np.float64).reshape(-1)[0], 0.0, 1.0))
@@ -119,12 +109,8 @@ class RigSlipControl(gymnasium.Env):
             if info['result'] != 'completed':
                 reward = FAULT_REWARD
             self._process = None
-        observation = self._observe(values)
-        self._picture.add(observation)
-        return observation, reward, ended, not ended and values['time_s'] > self._longest_s, info
-
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
-        return self._picture.draw()
+        self._rows.append(self._observe(values))
+        return self._rows[-1], reward, ended, not ended and values['time_s'] > self._longest_s, info
 
     def close(self) -> None:
         """Ends a run as Ctrl-C does: the outputs go to zero."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import _core
 from ..files import write_text, write_whole
-from ..options import whole
+from ..options import failed, whole
 from .rigs import TRAINING_SEED, Rigs, Task
 
 #: plants on which nobody trains
@@ -153,6 +153,5 @@ def main(arguments: list[str]) -> int:
         if o.figure:
             _draw(o.figure, curve.elite, curve.mean, {law: float(rewards[law].mean()) for law in LAWS})
     except (ValueError, OSError) as error:
-        print(f'abs_learn: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_learn', error)
     return 0

@@ -1,11 +1,8 @@
 """How short a braking can be: optimal control of the rig's own equations (docs/benchmark.md). Needs casadi."""
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ..options import PathLike, Value
-from .check import Driven, drive
-from .drivers import causal, preview
+from .drivers import Driven, causal, drive, preview
 from .rig import Rig
 from .road import road_of
 from .trajectory import NoOptimum, Trajectory

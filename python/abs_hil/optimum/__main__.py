@@ -1,13 +1,13 @@
 """python -m abs_hil.optimum: the bound of one plant and road, or the table of docs/benchmark.md."""
-from __future__ import annotations
-
 import argparse
 import json
 import sys
 from collections.abc import Sequence
 
+from ..options import failed
 
-def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
+
+def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog='python -m abs_hil.optimum', allow_abbrev=False,
                                      description='The shortest braking of a simulated rig, by optimal control.')
     parser.add_argument('--plant', metavar='NAME|FILE', default='paper-table1')
@@ -15,16 +15,11 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--start-speed', metavar='RAD_S', type=float, default=170.0, help='both wheels\' (170 rad/s)')
     parser.add_argument('--end-speed', metavar='M_S', type=float, default=0.3, help='the car\'s, where braking ends (0.3 m/s)')
     parser.add_argument('--json', action='store_true', help='prints JSON')
-    return parser.parse_args(arguments)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    given = _arguments(arguments)
+    given = parser.parse_args(arguments)
     try:
         from . import NoOptimum, drive, optimum
     except ModuleNotFoundError as error:
-        print(f'abs_hil.optimum: {error}; pip install casadi', file=sys.stderr)
-        return 3
+        return failed('abs_hil.optimum', f'{error}; pip install casadi', 3)
     try:
         values = {}
         for text in given.set:
@@ -40,8 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             found[name] = {'distance_m': braking.distance_m, 'time_s': braking.stop_time_s,
                            'torque_variation_Nm': braking.variation_Nm, 'distance_on_plant_m': driven.distance_m}
     except (ValueError, NoOptimum) as error:
-        print(f'abs_hil.optimum: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_hil.optimum', error)
     if given.json:
         print(json.dumps(found, indent=2))
         return 0

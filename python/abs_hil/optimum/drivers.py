@@ -1,24 +1,30 @@
-"""Two drivers: one knows the whole road, the other the present friction."""
-from __future__ import annotations
-
+"""Two drivers: one knows the whole road, the other the present friction. And what the plant makes of their brakings."""
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..options import PathLike, Value
+from ..stepped import Plant
 from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Rig
 from .road import Piece
 from .trajectory import NoOptimum, Trajectory, solve
 
 #: on a road that changes in a straight line the causal braking is planned again this often, s
 REPLAN_S = 0.04
+#: of the integration on a road that changes
+STEP_S = 1e-4
+#: of the commands that follow a ramp
+TICK_S = 2e-4
+#: decay of a slip that differs from the plan's, and lead of that torque over the brake's lag, 1/s
+FOLLOW_PER_S = 30.0
+LEAD_PER_S = 60.0
 
 
 class _Integrator:
     """States under commands that are given, by Runge-Kutta steps far below every time constant."""
-
-    STEP_S = 1e-4
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -33,7 +39,7 @@ class _Integrator:
         """The state after a part of interval k of a plan: under its command, or with a limit under its torque's rate."""
         change_Nm = float(plan.states[k + 1, TORQUE] - plan.states[k, TORQUE])
         control = change_Nm / float(plan.time_s[k + 1] - plan.time_s[k]) if self._rig.limited else float(plan.command_Nm[k])
-        steps = max(1, math.ceil(duration_s / self.STEP_S))
+        steps = max(1, math.ceil(duration_s / STEP_S))
         h = duration_s / steps
         for number in range(steps):
             friction = float(piece.friction(time_s + (number + 0.5) * h, x[DISTANCE] + 0.5 * h * self._rig['r2_m'] * x[OMEGA2]))
@@ -122,3 +128,47 @@ def preview(rig: Rig, start: np.ndarray, road: Sequence[Piece], end_speed_m_s: f
             if count == 1:
                 raise
             count -= 1  # the better braking stops before the last piece begins
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What the plant made of a trajectory."""
+    distance_m: float
+    time_s: float
+
+
+def drive(trajectory: Trajectory, plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = None) -> Driven:
+    """Simulates the commands of a trajectory on the plant of the program itself, and measures to the speed at which the trajectory
+    ends: an independent check of the equations and of their solution.
+
+    Without a limit of the brake's rate the commands run in open loop. With one the optimum passes the peak where friction falls,
+    and holds a slip there that is unstable: in open loop a thousandth of a newton metre grows until the wheel locks. So the
+    check then follows the plan's slip: it adds a small torque in proportion to the difference.
+
+    plant, set: those that the trajectory was found for. The duty is not rounded to the PWM's steps. Commands inside the
+    brake's dead zone give no torque.
+    """
+    rig = Rig.of(plant=plant, set=set)
+    r2, start = rig['r2_m'], trajectory.states[0]
+    wheels = Plant(plant, set)
+    wheels.reset(omega1_rad_s=float(rig.omega1_rad_s(start)), omega2_rad_s=float(start[OMEGA2]))
+    torque = trajectory.states[:, TORQUE]
+    follow_Ns_m = FOLLOW_PER_S * (1.0 + LEAD_PER_S / rig['c31_per_s']) * rig['J1_kg_m2'] / rig['r1_m']
+    for k, length_s in enumerate(np.diff(trajectory.time_s)):
+        ramp = (torque[k + 1] - torque[k]) / length_s
+        # With a limit of the rate the command runs ahead of a torque that changes in a straight line.
+        ticks = math.ceil(length_s / TICK_S) if rig.limited else 1
+        for tick in range(ticks):
+            part = (tick + 0.5) / ticks
+            ahead_Nm = torque[k] + ramp * (length_s * part + 1.0 / rig['c31_per_s'])
+            v = r2 * wheels.state.omega2_rad_s
+            planned = (1.0 - part) * trajectory.states[k, SLIP] + part * trajectory.states[k + 1, SLIP]
+            behind_m_s = planned * v - (v - rig['r1_m'] * wheels.state.omega1_rad_s)
+            command_Nm = ahead_Nm + follow_Ns_m * behind_m_s if rig.limited else trajectory.command_Nm[k]
+            wheels.advance(length_s / ticks, brake_duty=min(max((command_Nm - rig['b2_Nm']) / rig['b1_Nm'], 0.0), 1.0))
+    # A few millimetres a second are left over or missing: at the deceleration of the last interval.
+    before, end = r2 * trajectory.states[-2, OMEGA2], r2 * trajectory.states[-1, OMEGA2]
+    slowing = (before - end) / (trajectory.time_s[-1] - trajectory.time_s[-2])
+    v = r2 * wheels.state.omega2_rad_s
+    distance = r2 * wheels.state.angle2_rad + (v * v - end * end) / (2.0 * slowing)
+    return Driven(float(distance), float(trajectory.time_s[-1] + (v - end) / slowing)) if v > 0.0 else Driven(math.nan, math.nan)

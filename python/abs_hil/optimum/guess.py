@@ -1,6 +1,4 @@
 """Feasible brakings for the solver to start from. Each fixes the order in which the braked wheel turns and stands."""
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence
@@ -81,8 +79,6 @@ def best_slip(rig: Rig, friction: float) -> float:
 
 
 class Guesser:
-    """Simulates policies on a rig."""
-
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         x, f, slip, full, h = ca.SX.sym('x', 4), ca.SX.sym('f'), ca.SX.sym('slip'), ca.SX.sym('full'), ca.SX.sym('h')

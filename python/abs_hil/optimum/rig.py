@@ -1,11 +1,9 @@
 """The rig's equations (1), (2), (6), (7) as CasADi expressions, with the values of a plant of ours."""
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -28,7 +26,7 @@ class Rig:
     brake_duty_max: float = 1.0
 
     @classmethod
-    def of(cls, **arguments: Any) -> Rig:
+    def of(cls, **arguments: Any) -> Self:
         """The plant and the gate that these arguments of abs_hil.simulate give."""
         prefix, rows = 'plant.', keys(**arguments)
         return cls({name[len(prefix):]: row['value'] for name, row in rows.items() if name.startswith(prefix)},
@@ -77,29 +75,27 @@ class Rig:
 
     def force_N(self, x: Any, friction: Any) -> Any:
         """Tyre force while both wheels turn forwards."""
+        mu = self._gripped(x[SLIP], friction)
         if self.values['load'] == 'constant':
-            return self._constant_load_N(x[SLIP], friction)
-        mu = self._friction_coefficient(x[SLIP], friction)
+            return mu
         pressed_Nm = self['lever_Mg_Nm'] + x[TORQUE] + self['M10_Nm'] + self['d1_Nms_rad'] * self.omega1_rad_s(x)
         return mu * pressed_Nm / self._arm_m(mu)
 
     def standing_force_N(self, friction: Any) -> Any:
         """Tyre force while the brake holds the upper wheel: it then passes on only the torque that turns the wheel."""
-        slip = ca.DM(1.0)
+        mu = self._gripped(ca.DM(1.0), friction)
         if self.values['load'] == 'constant':
-            return self._constant_load_N(slip, friction)
-        mu = self._friction_coefficient(slip, friction)
+            return mu
         return mu * self['lever_Mg_Nm'] / (self._arm_m(mu) - self['r1_m'] * mu)
 
     def holds_Nm(self, friction: Any) -> Any:
         """The least brake torque that holds the upper wheel while the lower one turns."""
         return self['r1_m'] * self.standing_force_N(friction) - self['M10_Nm']
 
-    def _constant_load_N(self, slip: Any, friction: Any) -> Any:
-        return self['theta_N'] * friction * self._shape(slip)
-
-    def _friction_coefficient(self, slip: Any, friction: Any) -> Any:
-        return (self['mu_peak'] if self._magic else self._highest) * friction * self._shape(slip)
+    def _gripped(self, slip: Any, friction: Any) -> Any:
+        """The tyre's force under a constant load, N, or its friction coefficient under the lever."""
+        peak = self['theta_N'] if self.values['load'] == 'constant' else self['mu_peak'] if self._magic else self._highest
+        return peak * friction * (self._curve(slip) / (1.0 if self._magic else self._highest))
 
     def _arm_m(self, mu: Any) -> Any:
         """Of the lever: its arm less what friction takes of it."""
@@ -109,10 +105,6 @@ class Rig:
     @property
     def _magic(self) -> bool:
         return bool(self.values['tyre'] == 'magic-formula')
-
-    def _shape(self, slip: Any) -> Any:
-        """The friction curve with a peak of 1."""
-        return self._curve(slip) / (1.0 if self._magic else self._highest)
 
     @property
     def limited(self) -> bool:
@@ -141,11 +133,9 @@ class Rig:
         return ca.vertcat(slip_rate, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
 
     def rates_function(self, stands: bool = False) -> ca.Function:
-        """`rates` of (state, torque rate, friction)."""
         x, w, f = ca.SX.sym('x', 4), ca.SX.sym('w'), ca.SX.sym('f')
         return ca.Function('rates', [x, w, f], [self.rates(x, w, f, stands)])
 
     def force_function(self) -> ca.Function:
-        """`force_N` of (state, friction)."""
         x, f = ca.SX.sym('x', 4), ca.SX.sym('f')
         return ca.Function('force', [x, f], [self.force_N(x, f)])

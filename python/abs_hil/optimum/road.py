@@ -1,8 +1,5 @@
 """Pieces of road, as `plant.friction_profile` gives them."""
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -38,11 +35,6 @@ def road_of(rig: Rig) -> list[Piece]:
     text = str(rig.values['friction_profile'])
     if not text:
         return [Piece(1.0)]
-    axis, _, pieces = _core.profile_of(text, 'plant.friction_profile')
-    return pieces_of(axis, pieces)
-
-
-def pieces_of(axis: str, parts: Sequence[tuple[float, float, float]]) -> list[Piece]:
-    """The parts of a profile, each (begin, value, slope), as pieces."""
+    axis, _, parts = _core.profile_of(text, 'plant.friction_profile')
     ends = [begin for begin, _, _ in parts[1:]] + [math.inf]
     return [Piece(value, slope, begin, end, axis) for (begin, value, slope), end in zip(parts, ends)]

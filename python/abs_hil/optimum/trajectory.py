@@ -1,6 +1,4 @@
 """Optimal braking over a sequence of pieces of road, by direct collocation (Radau points, IPOPT)."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,11 +51,7 @@ class Trajectory:
         """Sum of the absolute changes of the commanded torque, from 0 on."""
         return float(np.abs(np.diff(self.command_Nm, prepend=0.0)).sum())
 
-    def until(self, count: int) -> Trajectory:
-        """The first `count` intervals."""
-        return Trajectory(self.time_s[:count + 1], self.states[:count + 1], self.command_Nm[:count])
-
-    def then(self, other: Trajectory) -> Trajectory:
+    def then(self, other: 'Trajectory') -> 'Trajectory':
         return Trajectory(np.concatenate([self.time_s, other.time_s[1:]]), np.concatenate([self.states, other.states[1:]]),
                           np.concatenate([self.command_Nm, other.command_Nm]))
 
@@ -172,9 +166,7 @@ def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase],
                 ramp = rig.rate_limit_Nm_s * variable(np.array([min(max(asked, -1.0), 1.0)]), -np.ones(1), np.ones(1))
             else:
                 command = variable(np.array([command_Nm]), np.array([0.0]), np.array([rig.max_torque_Nm]))
-            points = [x]
-            for j in range(DEGREE):
-                points.append(variable(phase.state_at(guess_s + POINTS[j + 1] * step_s) / SCALE, floor, ceiling))
+            points = [x, *(variable(phase.state_at(guess_s + at * step_s) / SCALE, floor, ceiling) for at in POINTS[1:])]
             guess_s += step_s
             for j in range(DEGREE):
                 state = points[j + 1] * _SCALE

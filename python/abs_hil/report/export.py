@@ -67,9 +67,7 @@ class Exporter:
                                           run.text('result'))):
                 record[name] = _ascii(text)
             phases = list(dict.fromkeys(text for name in TEXTS if name in columns for text in columns[name].tolist()))
-            names = np.empty((1, len(phases)), dtype=object)
-            names[0, :] = [_ascii(phase) for phase in phases]
-            record['phase_names'] = names
+            record['phase_names'] = np.array([[_ascii(phase) for phase in phases]], dtype=object)
             for name in self._columns:
                 values = columns.get(name, np.empty(0))
                 if name in TEXTS:

@@ -2,6 +2,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -125,8 +126,6 @@ def profiles_of(rows: Rows, found: Survey, window: Window, most_stretches: int) 
 
 
 class FigureMaker:
-    """Makes the figures from the surveys and curves of all runs."""
-
     def __init__(self, runs: list[RunFiles], surveys: list[Survey], windows: list[Window],
                  profiles: list[dict[str, Profile]], options: Options, braking: bool) -> None:
         self.runs, self.surveys, self.windows, self.profiles, self.options = runs, surveys, windows, profiles, options
@@ -191,6 +190,11 @@ class FigureMaker:
             legend, group = self._legend(run)
             self._add(panel, run, quantity, self._style(run), legend, group)
 
+    def _panel(self, quantity: str, label: Label, height_px: float = DOUBLE_PX, **more: Any) -> Panel:
+        panel = Panel(label, height_px=height_px, **more)
+        self._add_all(panel, quantity)
+        return panel
+
     def _add_reference(self, panel: Panel, quantity: str, legend: str) -> None:
         """A quantity that most runs share, as a thin dotted line: each different curve once."""
         drawn: list[np.ndarray] = []
@@ -245,28 +249,23 @@ class FigureMaker:
                            [panel], 4 + wheel)
 
     def _slip_panel(self) -> Panel:
-        panel = Panel(Label('slip <i>λ</i>', r'slip $\lambda$'), height_px=DOUBLE_PX, title='slip',
-                      y_range=self._relevant(('slip', 'slip_ref'), (0.0, 0.2)))
-        self._add_all(panel, 'slip')
+        panel = self._panel('slip', Label('slip <i>λ</i>', r'slip $\lambda$'), title='slip',
+                            y_range=self._relevant(('slip', 'slip_ref'), (0.0, 0.2)))
         self._add_reference(panel, 'slip_ref', 'reference')
         return panel
 
     def _asked_panel(self, label: str) -> Panel:
-        panel = Panel(Label.plain(label), height_px=DOUBLE_PX, title='torque asked for', unit='N m')
-        self._add_all(panel, 'torque_ref')
-        return panel
+        return self._panel('torque_ref', Label.plain(label), title='torque asked for', unit='N m')
 
     def _slip(self) -> Figure:
-        error = Panel(Label('<i>λ</i> − <i>λ</i><sub>ref</sub>', r'$\lambda - \lambda_\mathrm{ref}$'), height_px=DOUBLE_PX,
-                      y_range=self._relevant(('slip_error',), (-0.05, 0.05)), title='slip minus reference')
-        self._add_all(error, 'slip_error')
+        error = self._panel('slip_error', Label('<i>λ</i> − <i>λ</i><sub>ref</sub>', r'$\lambda - \lambda_\mathrm{ref}$'),
+                            y_range=self._relevant(('slip_error',), (-0.05, 0.05)), title='slip minus reference')
         return self._begin('fig7', 'Wheel slip and tracking error',
                            '(a) slip and its reference (dotted), (b) slip minus reference. The axes cover the range above '
                            '3 m/s; slip diverges towards standstill.' + self._estimated('slip'), [self._slip_panel(), error], 7)
 
     def _torque(self) -> Figure:
-        acting = Panel(Label.plain('acting / (N m)'), height_px=DOUBLE_PX, title='acting torque', unit='N m')
-        self._add_all(acting, 'torque')
+        acting = self._panel('torque', Label.plain('acting / (N m)'), title='acting torque', unit='N m')
         return self._begin('fig8', 'Brake torque',
                            "(a) the controller's torque reference, (b) the torque that acts behind the brake's lag."
                            + self._estimated('brake_torque_Nm'), [self._asked_panel('reference / (N m)'), acting], 8)
@@ -277,31 +276,22 @@ class FigureMaker:
                    if truth else 'Estimate only: these runs have no true θ, so the error is unknown.')
         if not any('theta_est_N' in found.known for found in self.surveys):
             caption += ' No controller of these runs estimates θ.'
-        theta = Panel(_symbol('θ', '', ' / N'), height_px=DOUBLE_PX if truth else 240.0,
-                      title='θ estimate', unit='N',
-                      y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
-        self._add_all(theta, 'theta_est')
+        theta = self._panel('theta_est', _symbol('θ', '', ' / N'), DOUBLE_PX if truth else 240.0, title='θ estimate', unit='N',
+                            y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
         panels = [theta]
         if truth:
             self._add_reference(theta, 'theta', "plant's value")
-            error = Panel(Label('error of <i>θ</i> / N', r'error of $\theta$ / N'), height_px=DOUBLE_PX,
-                          y_range=self._relevant(('theta_error',), (-1.0, 1.0)), title='error of θ', unit='N')
-            self._add_all(error, 'theta_error')
-            panels.append(error)
+            panels.append(self._panel('theta_error', Label('error of <i>θ</i> / N', r'error of $\theta$ / N'),
+                                      y_range=self._relevant(('theta_error',), (-1.0, 1.0)), title='error of θ', unit='N'))
         return self._begin('fig9', 'Estimate of the friction parameter θ', caption, panels, 9)
 
     def _distance(self) -> Figure:
-        panel = Panel(Label.plain('distance / m'), height_px=240.0, title='distance', unit='m')
-        self._add_all(panel, 'distance')
+        panel = self._panel('distance', Label.plain('distance / m'), 240.0, title='distance', unit='m')
         return self._begin('fig10', 'Braking distance', 'Distance of the car since the start of braking.', [panel], 10)
 
     def _signals(self) -> Figure:
-        names = list(dict.fromkeys(name for found in self.surveys for name in found.signals))
-        panels = []
-        for name in names:
-            panel = Panel(Label.plain(name), height_px=max(110.0, 9.0 * len(name)), title=name)
-            self._add_all(panel, f'signal {name}')
-            panels.append(panel)
+        panels = [self._panel(f'signal {name}', Label.plain(name), max(110.0, 9.0 * len(name)), title=name)
+                  for name in dict.fromkeys(name for found in self.surveys for name in found.signals)]
         return self._begin('signals', "The controllers' own signals",
                            'Each panel shows one signal of the runs whose controller reports it.', panels)
 

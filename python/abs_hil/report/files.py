@@ -43,7 +43,7 @@ class Event:
 @dataclass
 class Histogram:
     """Numbers of cycles by the duration of their parts: counts[part][us]."""
-    counts: list[np.ndarray]
+    counts: np.ndarray
     overflows: list[int]
 
 
@@ -80,15 +80,10 @@ class RunFiles:
 
 
 @dataclass
-class SeriesFiles:
-    name: str
-    runs: list[int]  # indices into FoundRuns.runs
-
-
-@dataclass
 class FoundRuns:
+    """series: the name of each, and its runs as indices into `runs`."""
     runs: list[RunFiles] = field(default_factory=list)
-    series: list[SeriesFiles] = field(default_factory=list)
+    series: list[tuple[str, list[int]]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
@@ -149,13 +144,10 @@ def read_histogram(path: pathlib.Path) -> Histogram:
         if overflow:
             overflows = counts
         else:
-            row = bins.setdefault(fields[0], [0] * len(PARTS))
-            bins[fields[0]] = [a + b for a, b in zip(row, counts)]
-    size = max(bins, default=-1) + 1
-    columns = [np.zeros(size, dtype=np.float64) for _ in PARTS]
+            bins[fields[0]] = [a + b for a, b in zip(bins.get(fields[0], [0] * len(PARTS)), counts)]
+    columns = np.zeros((len(PARTS), max(bins, default=-1) + 1))
     for us, counts in bins.items():
-        for part, count in enumerate(counts):
-            columns[part][us] = count
+        columns[:, us] = counts
     return Histogram(columns, overflows)
 
 
@@ -211,7 +203,7 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: Sequence[str] = (
         elif (path / 'series.json').exists() or any(path.glob('run-*/')):
             folders, notes = runs_in_series(path)
             found.notes += [clean(note) for note in notes]
-            found.series.append(SeriesFiles(_base_name(path), [*range(len(found.runs), len(found.runs) + len(folders))]))
+            found.series.append((_base_name(path), [*range(len(found.runs), len(found.runs) + len(folders))]))
             found.runs += [_load_run(folder) for folder in folders]
         else:
             raise ValueError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '

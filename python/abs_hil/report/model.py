@@ -119,12 +119,6 @@ class Figure:
     paper: int = 0  # number of the paper's figure that it repeats; 0: none
 
 
-def _step_for(span: float, wanted: int) -> float:
-    rough = span / wanted
-    power = 10.0 ** math.floor(math.log10(rough))
-    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 0.999 * rough)
-
-
 def axis_around(low: float, high: float, wanted: int) -> tuple[float, float]:
     """The range widened to whole steps of 1, 2 or 5 times a power of ten, so that curves do not touch the frame."""
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -133,7 +127,9 @@ def axis_around(low: float, high: float, wanted: int) -> tuple[float, float]:
     if not high - low > 1e-9 * size:
         room = 0.5 * size if size > 0.0 else 0.5  # a constant curve gets space above and below
         low, high = low - room, high + room
-    step = _step_for(high - low, wanted)
+    rough = (high - low) / wanted
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 0.999 * rough)
     margin = 0.02 * (high - low)
     top = step * math.ceil((high + margin) / step)
     # An axis that begins at zero keeps zero as its end; a tiny negative value must not add a whole step.
@@ -168,9 +164,8 @@ def thinned(x: np.ndarray, y: np.ndarray, most_stretches: int) -> tuple[np.ndarr
         places = np.unique(kept)
         x, y = x[places], y[places]
     unknown = np.isnan(y)
-    if unknown.any():
-        repeated = unknown & np.concatenate(([True], unknown[:-1]))
-        x, y = x[~repeated], y[~repeated]
-        if len(y) and np.isnan(y[-1]):
-            x, y = x[:-1], y[:-1]
+    repeated = unknown & np.concatenate(([True], unknown))[:-1]
+    x, y = x[~repeated], y[~repeated]
+    if len(y) and np.isnan(y[-1]):
+        x, y = x[:-1], y[:-1]
     return x, y

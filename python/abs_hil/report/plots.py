@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .model import DARK, Curve, Figure, Panel, Style, phase_colour
+from .model import DARK, Curve, Figure, Panel, phase_colour
 
 GAP_PX = 14.0
 MARKS_PX = 16.0  # a line of names of marks above the first panel
@@ -49,13 +49,6 @@ def packed(plots: list[dict[str, Any]]) -> bytes:
     return len(text).to_bytes(4, 'little') + text + bytes(floats)
 
 
-def _line(style: Style) -> dict[str, Any]:
-    line: dict[str, Any] = {'color': style.colour, 'width': style.width}
-    if style.dash:
-        line['dash'] = ','.join(f'{length:g}px' for length in style.dash)
-    return line
-
-
 def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict[str, Any]:
     trace: dict[str, Any] = {
         'x': numbers(curve.x), 'y': numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
@@ -64,7 +57,8 @@ def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict
     title = curve.title or panel.title
     trace['hovertemplate'] = _escaped(f'{title} %{{y:.5~g}} {panel.unit}'.strip())
     if curve.drawn == 'line':
-        return {**trace, 'mode': 'lines', 'line': _line(curve.style)}
+        dash = {'dash': ','.join(f'{length:g}px' for length in curve.style.dash)} if curve.style.dash else {}
+        return {**trace, 'mode': 'lines', 'line': {'color': curve.style.colour, 'width': curve.style.width, **dash}}
     symbol = SYMBOLS[curve.marker]
     trace.update(mode='markers', marker={'color': curve.style.colour, 'symbol': symbol, 'size': 8})
     if symbol == 'square':  # explains a colour of phases
@@ -76,7 +70,7 @@ def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict
     return trace
 
 
-def _nothing(number: int, panel: Panel) -> dict[str, Any]:
+def _nothing(number: int) -> dict[str, Any]:
     """An invisible point: plotly.js draws no axes without a curve."""
     return {'x': numbers(np.zeros(1)), 'y': numbers(np.zeros(1), 'f4'), 'xaxis': f'x{number}', 'yaxis': f'y{number}',
             'mode': 'markers', 'opacity': 0, 'showlegend': False, 'hoverinfo': 'skip', 'meta': None}
@@ -152,7 +146,8 @@ def _shapes(figure: Figure) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]
 def plot(figure: Figure) -> dict[str, Any]:
     """The figure as {id, axis, height, data, layout}."""
     inner = sum(panel.height_px for panel in figure.panels) + GAP_PX * (len(figure.panels) - 1)
-    layout: dict[str, Any] = {'shapes': [], 'annotations': []}
+    shapes, texts = _shapes(figure)
+    layout: dict[str, Any] = {'shapes': shapes, 'annotations': []}
     data = []
     seen: set[str] = set()
     top = 1.0
@@ -160,22 +155,17 @@ def plot(figure: Figure) -> dict[str, Any]:
         bottom = max(top - panel.height_px / inner, 0.0)
         layout[f'xaxis{number if number > 1 else ""}'] = _x_axis(figure, panel, number, number == len(figure.panels))
         layout[f'yaxis{number if number > 1 else ""}'] = _y_axis(panel, (bottom, top), number)
+        if panel.y_label.html and 1 < len(figure.panels) < 6:
+            layout['annotations'].append({'x': 0.004, 'xref': 'paper', 'xanchor': 'left', 'showarrow': False, 'y': top,
+                                          'yref': 'paper', 'yanchor': 'top', 'text': f'({"abcdef"[number - 1]})',
+                                          'font': {'size': 12}})
         top = bottom - GAP_PX / inner
         if not panel.curves:
-            data.append(_nothing(number, panel))
+            data.append(_nothing(number))
         for curve in panel.curves:
             new = bool(curve.legend) and curve.legend not in seen
             seen.add(curve.legend)
             data.append(_trace(curve, panel, number, new))
-    if len(figure.panels) > 1 and len(figure.panels) < 6:
-        for number, panel in enumerate(figure.panels):
-            if panel.y_label.html:
-                layout['annotations'].append({'x': 0.004, 'xref': 'paper', 'xanchor': 'left', 'showarrow': False,
-                                              'y': layout[f'yaxis{number + 1 if number else ""}']['domain'][1],
-                                              'yref': 'paper', 'yanchor': 'top', 'text': f'({"abcdef"[number]})',
-                                              'font': {'size': 12}})
-    shapes, texts = _shapes(figure)
-    layout['shapes'] += shapes
     layout['annotations'] += texts
     names = len(seen - {''})
     legend_px = LEGEND_LINE_PX * (1 + (names - 1) // 3) if names else 0.0

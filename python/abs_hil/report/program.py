@@ -1,27 +1,92 @@
-"""The command line of abs_report."""
+"""The command line of abs_report: reads the runs once, makes figures, tables and the page."""
 import argparse
 import contextlib
 import io
 import pathlib
 import re
 import sys
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from ..core import _core
 from ..files import refuse_existing, write_text, write_whole
+from ..options import failed
 from ..simulation import progress_shown
+from . import paper, pictures, tables
 from .export import FORMATS as EXPORTS
 from .export import Exporter
-from .figures import Choice
-from .files import find_runs
-from .page import PAGE_MARK, Unavailable
-from .pictures import FORMATS as PICTURES
-from .report import make
+from .figures import Choice, Options, run_figures
+from .files import FoundRuns, RunFiles, find_runs
+from .model import STYLES, Figure
+from .page import PAGE_MARK, Unavailable, page
+from .series import SeriesStudy, group_table, series_figure, series_table, study
+from .survey import Survey
 from .tables import Table, merits
 from .text import clean
+from .timing import timing_figure
 
-BAD_INPUT, UNAVAILABLE = 2, 3
 MOST_NOTES = 10
 _MARK_BYTES = 4096
+
+
+def _title(found: FoundRuns, of_paper: bool) -> str:
+    runs = found.runs
+    if of_paper:
+        return 'The paper’s comparison: figures 5 to 10'
+    if found.series:
+        return f'Series {found.series[0][0]}'
+    if len(runs) == 1:
+        return f'Run {runs[0].label}' if runs[0].label == runs[0].called else f'Run {runs[0].name}: {runs[0].label}'
+    if len(runs) == 2:
+        return f'Runs {runs[0].label} and {runs[1].label}'
+    return f'{len(runs)} runs, {runs[0].label} to {runs[-1].label}'
+
+
+def _lead(runs: list[RunFiles]) -> str:
+    names = list(dict.fromkeys(name for run in runs if (name := run.text('experiment'))))
+    lead = f'{len(runs)} run{"" if len(runs) == 1 else "s"}'
+    return f'{lead}, experiment{"" if len(names) == 1 else "s"} {", ".join(names)}' if names else lead
+
+
+def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
+    """Gives runs of one series a style for each varied value, if the palette has enough colours."""
+    if len(studies) != 1 or len(studies[0].groups) > STYLES or sum(len(g.runs) for g in studies[0].groups) != runs:
+        return
+    options.groups = [0] * runs
+    for number, group in enumerate(studies[0].groups):
+        options.group_labels.append(group.label)
+        for run in group.runs:
+            options.groups[run] = number
+
+
+def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice, of_paper: bool,
+         progress: Callable[[int, int], None] | None = None) -> tuple[list[RunFiles], list[Survey], list[Figure], dict[str, Any]]:
+    """Reads the runs (run folders, CSV files, series folders). Returns them, what their rows say, all figures in the order of the
+    page, and what the page shows, by the names of its template. Raises ValueError for what cannot be used."""
+    found = find_runs(paths, labels)
+    runs = found.runs
+    if of_paper:
+        paper.order_for_paper(runs, found.notes)
+    studies = [study(*series, runs) for series in found.series]
+    options = Options(choice, of_paper)
+    _groups(studies, len(runs), options)
+    surveys, figures = run_figures(runs, options, progress)
+    series: list[dict[str, Any]] = [
+        {'name': one.name, 'figure': series_figure(number, one, runs, surveys), 'groups': group_table(one, runs, surveys),
+         'table': series_table(one, runs, surveys)} for number, one in enumerate(studies, 1)]
+    timing = timing_figure(runs)
+    metrics, shared = tables.metrics_table(runs, surveys)
+    events, left_out = tables.events_table(runs, surveys)
+    pairs = paper.pairs_of(runs, surveys) if of_paper else {}
+    parts = {'title': clean(title) or _title(found, of_paper), 'version': _core.version,
+             'lead': paper.lead(runs) if of_paper else _lead(runs), 'runs': len(runs), 'figures': figures, 'series': series,
+             'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if of_paper else None,
+             'metrics': metrics, 'shared': shared, 'phases': tables.phases_table(runs, surveys), 'events': events,
+             'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
+             'timing_figure': timing, 'environment': tables.environment_table(runs),
+             'notes': tables.all_notes(runs, surveys, found.notes)}
+    every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
+    return runs, surveys, every, parts
 
 
 def parser() -> argparse.ArgumentParser:
@@ -44,7 +109,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--paper', action='store_true',
                       help="make the paper's comparison page from an adaptive and a sliding-mode run")
     made.add_argument('--figures', metavar='DIR', default='', help='folder for the figures as separate files')
-    made.add_argument('--format', choices=PICTURES, default=None, help='format of these files [svg]')
+    made.add_argument('--format', choices=pictures.FORMATS, default=None, help='format of these files [svg]')
     made.add_argument('--table', action='store_true', help='print the figures of merit as a plain table; makes no page')
     made.add_argument('--merits', metavar='FILE', default='',
                       help='write the figures of merit as CSV, one row a run, numbers in full')
@@ -123,33 +188,31 @@ def _report(o: argparse.Namespace) -> None:
         if not o.table and path.resolve() == pathlib.Path(o.merits).resolve():
             raise ValueError(f'"{path}" is one file for --output and --merits; give two')
     with progress_shown(sys.stderr.isatty()) as progress:
-        made = make(o.runs, o.labels, o.title, choice, o.paper, progress)
+        runs, surveys, figures, parts = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
-        frame = merits(made.runs, made.surveys)
+        frame = merits(runs, surveys)
         write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))
     if o.table:
-        for part in made.parts['series']:
+        for part in parts['series']:
             _print_rows(part['groups'])
             print()
-        _print_rows(made.parts['metrics'])
+        _print_rows(parts['metrics'])
     else:
-        write_text(path, made.html())
-    _say(made.parts['notes'])
+        write_text(path, page(**parts))
+    _say(parts['notes'])
     if not o.table:
         print(path)
     if o.merits:
         print(o.merits)
     if o.figures:
-        from . import pictures
-        for figure in pictures.write(made.figures, pathlib.Path(o.figures), o.format or 'svg', o.force):
-            print(figure)
+        print(*pictures.write(figures, pathlib.Path(o.figures), o.format or 'svg', o.force), sep='\n')
 
 
 def _report_study(o: argparse.Namespace) -> None:
-    from ..studies import page
-    results = page.results_of(o)
+    from ..studies import page as of_study
+    results = of_study.results_of(o)
     if o.table:
-        _print_rows(page.quantile_table(results))
+        _print_rows(of_study.quantile_table(results))
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:
@@ -157,7 +220,7 @@ def _report_study(o: argparse.Namespace) -> None:
         results.to_parquet(path)
     else:
         _check_replaceable(path, o.force)
-        write_text(path, page.page_of(o, results))
+        write_text(path, of_study.page_of(o, results))
     print(path)
 
 
@@ -185,9 +248,7 @@ def main(arguments: list[str]) -> int:
         else:
             _report(o)
     except Unavailable as error:
-        print(f'abs_report: {error}', file=sys.stderr)
-        return UNAVAILABLE
+        return failed('abs_report', error, 3)
     except (ValueError, OSError) as error:
-        print(f'abs_report: {clean(error, 4000)}', file=sys.stderr)
-        return BAD_INPUT
+        return failed('abs_report', clean(error, 4000))
     return 0

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import _core
 from ..figures import FigureOfMerit, figures
-from .files import RunFiles, SeriesFiles, differing_keys
+from .files import RunFiles, differing_keys
 from .model import Curve, Figure, Label, Panel, Style
 from .survey import Survey, merits_shown, value_of
 from .tables import Table
@@ -39,15 +39,11 @@ class SeriesStudy:
         """True if the groups stand at their values on the x axis, false if at 1, 2, 3, ..."""
         return len(self.keys) == 1 and len(self.groups) > 1 and all(math.isfinite(group.value) for group in self.groups)
 
-    @property
-    def places(self) -> list[float]:
-        return [group.value if self.by_value else float(number) for number, group in enumerate(self.groups, 1)]
 
-
-def study(series: SeriesFiles, runs: list[RunFiles]) -> SeriesStudy:
-    found = SeriesStudy(series.name, [key for key in differing_keys([runs[n] for n in series.runs]) if key != 'run.seed'])
+def study(name: str, numbers: list[int], runs: list[RunFiles]) -> SeriesStudy:
+    found = SeriesStudy(name, [key for key in differing_keys([runs[number] for number in numbers]) if key != 'run.seed'])
     known: dict[tuple[str, ...], Group] = {}
-    for number in series.runs:
+    for number in numbers:
         values = tuple(runs[number].config.get(key, DASH) for key in found.keys)
         if values not in known:
             parts = [f'{key.rpartition(".")[2]} = {value}' for key, value in zip(found.keys, values)][:MOST_KEYS_IN_LABEL]
@@ -98,21 +94,17 @@ def series_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]
 
 
 def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Figure:
-    places = found.places
+    places = [group.value if found.by_value else float(place) for place, group in enumerate(found.groups, 1)]
     room = 0.06 * (max(places) - min(places)) if max(places) > min(places) else 0.5
     x_range = (min(places) - room, max(places) + room)
     beside = 0.012 * (x_range[1] - x_range[0])
     panels = []
     for key, label in SHOWN.items():
         metric = figures()[key]
-        every: list[tuple[float, float]] = []
-        means: list[tuple[float, float, float, float]] = []
-        for place, group in zip(places, found.groups):
-            values = _values(metric, group, runs, surveys)
-            every += [(place + beside, value) for value in values if math.isfinite(value)]
-            n, mean, _, low, high = _core.estimate_mean(values)
-            if n > 1:
-                means.append((place, mean, low, high))
+        values = [_values(metric, group, runs, surveys) for group in found.groups]
+        every = [(place + beside, value) for place, some in zip(places, values) for value in some if math.isfinite(value)]
+        estimates = zip(places, map(_core.estimate_mean, values))
+        means = [(place, mean, low, high) for place, (n, mean, _, low, high) in estimates if n > 1]
         if not every:
             continue
         panel = Panel(Label.plain(label), height_px=130.0)

@@ -24,9 +24,7 @@ RELEASED_S = 0.2
 SLIP_STEP = 0.01
 _METRIC_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est',
                    'slip_ref', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
-_PROFILES = {'plant.friction_profile': 'friction', 'plant.brake_torque_profile': 'brake torque',
-             'plant.motor_torque_profile': 'motor torque', 'plant.upper_bearing_profile': 'upper bearing',
-             'plant.lower_bearing_profile': 'lower bearing'}
+_PROFILES = ('friction', 'brake_torque', 'motor_torque', 'upper_bearing', 'lower_bearing')
 
 
 def merits_shown() -> list[FigureOfMerit]:
@@ -132,18 +130,17 @@ def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
     changes: list[Change] = []
     time, braking = rows.time_s, rows.braking
     rolled = None
-    for key, what in _PROFILES.items():
+    for what in _PROFILES:
+        key = f'plant.{what}_profile'
         if not run.config.get(key):
             continue
         try:
             axis, from_braking, pieces = _core.profile_of(run.config[key], key)
         except ValueError:
             continue
-        first = 0
-        if from_braking:
-            if not braking.any():
-                continue
-            first = int(np.argmax(braking))
+        if from_braking and not braking.any():
+            continue
+        first = int(np.argmax(braking)) if from_braking else 0
         if axis == 'distance' and rolled is None:
             speed = r2_m * rows.columns['omega2_rad_s']
             rolled = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(time) * (speed[1:] + speed[:-1]))))
@@ -156,7 +153,7 @@ def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
             if not len(reached):
                 break
             at = origin + begin if axis == 'time' else time[first + reached[0]]
-            changes.append(Change(float(at), f'{what} × {value:.3g}' if slope == 0.0 else f'{what} drifts'))
+            changes.append(Change(float(at), what.replace('_', ' ') + (f' × {value:.3g}' if slope == 0.0 else ' drifts')))
     return changes
 
 

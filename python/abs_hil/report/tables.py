@@ -1,16 +1,14 @@
 """The tables of a report. Cells are plain text."""
-from __future__ import annotations
-
+import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Self
+
+import pandas
 
 from .files import Event, RunFiles, differing_keys
 from .survey import Survey, contradictions, merits_shown, value_of
 from .text import DASH, shown, significant
-
-if TYPE_CHECKING:
-    import pandas
 
 #: with more runs than this, runs become rows instead of columns
 MOST_COLUMNS = 5
@@ -24,12 +22,12 @@ class Table:
     rows: list[list[str]]
     numbers: bool = True  # the first column names the row; all others are numbers, aligned to the right
 
-    def arranged(self, runs: int) -> Table:
+    def arranged(self, runs: int) -> Self:
         """With many runs, rows and columns change places."""
         if runs <= MOST_COLUMNS:
             return self
         lines = [list(line) for line in zip(*[self.header, *self.rows])]
-        return Table(self.id, lines[0], lines[1:], self.numbers)
+        return dataclasses.replace(self, header=lines[0], rows=lines[1:])
 
 
 def _change(first: float, second: float) -> str:
@@ -97,12 +95,9 @@ def phases_table(runs: list[RunFiles], surveys: list[Survey]) -> Table:
 
 def merits(runs: list[RunFiles], surveys: list[Survey]) -> pandas.DataFrame:
     """The figures of merit with full precision, one row a run."""
-    import pandas
-    rows: list[dict[str, Any]] = []
-    for run, found in zip(runs, surveys):
-        rows.append({'run': run.called, **{key: run.text(key) for key in ('controller', 'plant', 'experiment', 'result')},
-                     **{metric.name: value_of(metric, run, found) for metric in merits_shown()}})
-    return pandas.DataFrame(rows)
+    return pandas.DataFrame([
+        {'run': run.called, **{key: run.text(key) for key in ('controller', 'plant', 'experiment', 'result')},
+         **{metric.name: value_of(metric, run, found) for metric in merits_shown()}} for run, found in zip(runs, surveys)])
 
 
 def timing_table(runs: list[RunFiles]) -> Table:

@@ -12,13 +12,9 @@ BINS_A_DECADE = 10.0
 
 def _edges(last_us: int) -> np.ndarray:
     """Lower edges, in whole us, of bins of about equal width on a logarithmic axis: 0, 1, 2, ..."""
-    edges, exponent = [0, 1], 0.0
-    while edges[-1] <= last_us:
-        edge = round(10.0 ** exponent)
-        if edge > edges[-1]:
-            edges.append(edge)
-        exponent += 1.0 / BINS_A_DECADE
-    return np.array(edges)
+    bins = math.ceil(BINS_A_DECADE * (math.log10(last_us + 1) + 1.0))
+    edges = np.unique(np.append(0, np.rint(10.0 ** (np.arange(bins) / BINS_A_DECADE)).astype(int)))
+    return edges[:np.searchsorted(edges, last_us, 'right') + 1]
 
 
 def outline(counts: np.ndarray, total: float, floor: float) -> tuple[np.ndarray, np.ndarray]:

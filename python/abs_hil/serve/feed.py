@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..core import _core, load_network
-from ..messages import MOST_SIGNALS, PHASES, QUANTITIES, decode
-from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
-from .runs import LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, RunFacts
+from ..messages import MOST_SIGNALS, PHASES, decode
+from .runs import COLUMNS, DERIVED_PLACE, FIELDS, LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, PLACE, WIDTH, History, RunFacts
 
 Packet = tuple[str, bytes]
 #: a listener gets the run and its new rows, of shape (cycles, WIDTH)
@@ -49,22 +48,21 @@ class Feed:
         self._heard = 0.0
         self._run: RunFacts | None = None
         self._early: dict[str, object] = {}  # the next cycle says whether it belongs to the present run or the next
-        made = decode_fields()
-        self._get = attrgetter(*made)
-        self._later = [name for name in COLUMNS if name not in made]
+        self._get = attrgetter(*FIELDS)
+        self._later = COLUMNS[len(FIELDS):]
 
     def take(self, packets: list[Packet]) -> None:
         now = time.monotonic()
         for channel, data in packets:
             if channel.startswith(self._prefix):
-                self._one(channel, data)
+                self._one(data)
         self._flush()
         if packets:
             self._heard = now
         elif now > self._heard + IDLE_S:
             self.history.close_bin()
 
-    def _one(self, channel: str, data: bytes) -> None:
+    def _one(self, data: bytes) -> None:
         try:
             message = decode(data)
         except ValueError:
@@ -91,32 +89,29 @@ class Feed:
             return
         if 0 < cycle <= self._last_cycle < cycle + LATE_CYCLES:
             return  # out of order, or twice
-        if self._run is None or cycle <= self._last_cycle:
-            self._flush()
-            self._begin()
+        run = self._run if self._run is not None and cycle > self._last_cycle else self._begin()
         if names != self._names:
             self._flush()
             self._names = names
-            if self._run is not None:
-                self._run.own = tuple(filter(_core.is_signal_name, dict.fromkeys(names.split(','))))[:MOST_SIGNALS]
-        if self._early and self._run is not None:
-            for early in self._early.values():
-                self._run.take(early)
-            self._early.clear()
+            run.own = tuple(filter(_core.is_signal_name, dict.fromkeys(names.split(','))))[:MOST_SIGNALS]
+        for early in self._early.values():
+            run.take(early)
+        self._early.clear()
         self._last_cycle = cycle
         values = dict(zip(names.split(','), message.values))
-        own = self._run.own if self._run is not None else ()
-        tail = [values.get(name, math.nan) for name in (*self._later, *own)]
-        self._rows.append((*self._get(message), *tail, *([math.nan] * (WIDTH - len(COLUMNS) - len(own)))))
+        tail = [values.get(name, math.nan) for name in (*self._later, *run.own)]
+        self._rows.append((*self._get(message), *tail, *([math.nan] * (WIDTH - len(COLUMNS) - len(run.own)))))
         self._phase_names.append(message.phase_name[:MOST_TEXT])
 
-    def _begin(self) -> None:
+    def _begin(self) -> RunFacts:
+        self._flush()
         number = self._run.number + 1 if self._run is not None else 0
         self._run = RunFacts(number, time.time())
         self._names = ''
         self.runs[number] = self._run
         while len(self.runs) > MOST_RUNS:
             del self.runs[next(iter(self.runs))]
+        return self._run
 
     def _flush(self) -> None:
         if not self._rows or self._run is None:
@@ -139,7 +134,7 @@ class Feed:
         before = cycles.places(cycles.head - MOST_IN_WINDOW, cycles.head)
         known = np.concatenate((cycles.values[before[cycles.run[before] == self._run.number]], rows))
         time_s = known[:, PLACE['time_s']]
-        numbers = bin_numbers(time_s)
+        numbers = self.history.bin_numbers(time_s)
         for last in np.flatnonzero(np.diff(numbers, append=-1)).tolist():
             if last < len(known) - len(rows):
                 continue
@@ -147,15 +142,6 @@ class Feed:
             found = force_point(known[first:last + 1], self._run.config)
             if found is not None:
                 rows[last - len(known), DERIVED_PLACE:] = found
-
-
-def decode_fields() -> list[str]:
-    """Quantities that are fields of telemetry_t, in the order of COLUMNS, which must begin with them."""
-    from ..messages import TYPES
-    fields = [name for name in QUANTITIES if name in TYPES['telemetry_t'].__slots__]
-    if list(COLUMNS[:len(fields)]) != fields:
-        raise ImportError('quantities.json: a quantity without a field in telemetry_t stands before one with a field')
-    return fields
 
 
 def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float] | None:
@@ -176,8 +162,7 @@ def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float]
     time_s = rows[:, PLACE['sample_time_s']]
     scaled = (time_s - (time_s[0] + time_s[-1]) / 2) / HALF_WINDOW_S
     counts = rows[:, [PLACE['upper_counts'], PLACE['lower_counts']]].astype(np.int64)
-    steps = (np.diff(counts, axis=0) + (1 << 31)) % (1 << 32) - (1 << 31)  # the counters wrap around at 32 bit
-    angles = np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0))) * (2 * np.pi / counts_per_rev)
+    angles = np.unwrap(counts - counts[0], axis=0, period=1 << 32) * (2 * np.pi / counts_per_rev)  # they wrap around at 32 bit
     if not np.isfinite(scaled).all():
         return None
     _, first, second, _ = np.linalg.lstsq(np.vander(scaled, 4, increasing=True), angles, rcond=None)[0]

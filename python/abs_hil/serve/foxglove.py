@@ -48,18 +48,18 @@ class Channels(messages.Topics):
             raise OSError(f'--foxglove cannot listen at {HOST}, port {port}: {error}; give another port') from None
 
     def wants(self, topic: str) -> bool:
-        return topic in self._channels and bool(self._channels[topic].has_sinks())
+        return topic in self.channels and bool(self.channels[topic].has_sinks())
 
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
-        if topic in self._channels:
-            self._channels[topic].log(data, log_time=time_ns)
+        if topic in self.channels:
+            self.channels[topic].log(data, log_time=time_ns)
 
     def add(self, topic: str, type_name: str, definition: str) -> None:
         """A topic that exists already gets another definition."""
-        if topic in self._channels:
-            self._channels.pop(topic).close()
+        if topic in self.channels:
+            self.channels.pop(topic).close()
         if self._made == MOST_CHANNELS:
             return
         self._made += 1
         schema = self._package.Schema(name=type_name, encoding='ros2msg', data=definition.encode())
-        self._channels[topic] = self._package.Channel(topic, message_encoding='cdr', schema=schema, context=self._context)
+        self.channels[topic] = self._package.Channel(topic, message_encoding='cdr', schema=schema, context=self._context)

@@ -4,12 +4,12 @@ import asyncio
 import pathlib
 import secrets
 import signal
-import sys
 from typing import Any
 
 from ..core import load_network
+from ..options import failed
 from .feed import Feed, Live, Played
-from .history import BIN_S, History
+from .runs import BIN_S, History
 from .server import Command, Server, is_loopback
 
 PORT, FOXGLOVE_PORT = 8265, 8765
@@ -51,11 +51,9 @@ def main(arguments: list[str]) -> int:
             load_network('--commands').check_key(given.commands)
         return 128 + asyncio.run(_serve(given, source))
     except ValueError as error:
-        print(f'abs_serve: {error}', file=sys.stderr)
-        return 2
+        return failed('abs_serve', error)
     except (ImportError, OSError) as error:
-        print(f'abs_serve: {error}', file=sys.stderr)
-        return 3
+        return failed('abs_serve', error, 3)
 
 
 def _source(given: Any) -> Live | Played:

@@ -19,10 +19,10 @@ from aiohttp import web
 from ..messages import PHASES, QUANTITIES
 from ..nesting import parse_json
 from ..places import charts
+from ..run import COLUMNS as CSV_COLUMNS
 from ..run import csv_bytes, phase_names
 from .feed import Feed
-from .history import BIN_S, COLUMNS, DERIVED, PLACE
-from .runs import RunFacts
+from .runs import BIN_S, COLUMNS, DERIVED, PLACE, RunFacts
 from .viewer import REASON_KINDS, STUCK_S, Bad, Viewer, real, whole
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
@@ -34,8 +34,6 @@ HEADERS = {'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff
            'Cross-Origin-Opener-Policy': 'same-origin', 'X-Frame-Options': 'DENY'}
 #: of downloads
 DOWNLOADS = {'csv': 'text/csv', 'mcap': 'application/octet-stream'}
-_CSV = tuple(sorted((name for name in COLUMNS if QUANTITIES[name]['csv_column'] is not None),
-                    key=lambda name: int(QUANTITIES[name]['csv_column'])))
 KINDS = {'.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css'}
 MOST_CONNECTIONS, MOST_VIEWERS, MOST_DOWNLOADS = 128, 64, 4
 #: of a download; each is taken within STUCK_S, or the connection is closed
@@ -52,13 +50,11 @@ class Door(web.Server):
 
     def __init__(self, handler: Any) -> None:
         super().__init__(handler)
-        self.refused = 0
         self._timers: dict[Any, asyncio.TimerHandle] = {}
 
     def connection_made(self, handler: Any, transport: Any) -> None:
         super().connection_made(handler, transport)
         if len(self.connections) > MOST_CONNECTIONS:
-            self.refused += 1
             transport.abort()
         else:
             self.allow(transport, UNDECIDED_S)
@@ -219,7 +215,7 @@ def is_our_fault(record: logging.LogRecord) -> bool:
 def file_of(kind: str, run: RunFacts, rows: np.ndarray) -> BinaryIO:
     """An open file without a name: CSV has the columns of --csv, bit-exactly, and the controller's own signals. Raises
     ImportError without the package mcap, OSError on a full disk."""
-    columns = {name: rows[:, PLACE[name]] for name in _CSV} | dict(zip(run.own, rows[:, len(COLUMNS):].T))
+    columns = {name: rows[:, PLACE[name]] for name in CSV_COLUMNS} | dict(zip(run.own, rows[:, len(COLUMNS):].T))
     phase = columns['phase']
     columns['phase'] = phase_names(np.where((phase >= 0) & (phase < len(PHASES)), phase, PHASES.index('fault')))
     with tempfile.TemporaryDirectory() as folder:

@@ -14,8 +14,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from ..messages import PHASES, REASONS
 from ..nesting import parse_json
 from .feed import Feed
-from .history import PLACE, own_place
-from .runs import RunFacts
+from .runs import PLACE, RunFacts, own_place
 
 TICK_S = 0.05
 FACTS_S = 0.25
@@ -39,7 +38,6 @@ class Trigger:
 
     def __init__(self, asked: dict[str, Any]) -> None:
         self._kind = asked.get('on')
-        self.caught: dict[str, Any] | None = None
         self._before = math.nan
         self._run = -1
         self._wanted: int | None = None
@@ -57,20 +55,21 @@ class Trigger:
         else:
             raise Bad(f'on "{self._kind}": give level, phase or event')
 
-    def look(self, run: RunFacts, rows: np.ndarray) -> None:
+    def look(self, run: RunFacts, rows: np.ndarray) -> dict[str, Any] | None:
+        """What a viewer is told of the first cycle that meets it; None: none of these does."""
         place = own_place(run.own, self._signal)
-        if self.caught is not None or place is None:
-            return
+        if place is None:
+            return None
         values = rows[:, place]
         first = run.number != self._run
         before = np.concatenate(([math.nan if first else self._before], values[:-1]))
         self._run, self._before = run.number, float(values[-1])
         hit = np.flatnonzero(self._hits(before, values, rows))
-        if hit.size:
-            row = rows[hit[0]]
-            self.caught = {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]),
-                           'cycle': int(row[PLACE['cycle']]), 'value': float(values[hit[0]]),
-                           'text': self._in_words(row)}
+        if not hit.size:
+            return None
+        row = rows[hit[0]]
+        return {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]), 'cycle': int(row[PLACE['cycle']]),
+                'value': float(values[hit[0]]), 'text': self._in_words(row)}
 
     def _in_words(self, row: np.ndarray) -> str:
         if self._kind == 'event':
@@ -128,10 +127,9 @@ class Viewer:
             sender.cancel()
 
     def _look(self, run: RunFacts, rows: np.ndarray) -> None:
-        if self._trigger is not None and self._trigger.caught is None:
-            self._trigger.look(run, rows)
-            if self._trigger.caught is not None:
-                self._reply(self._trigger.caught)
+        if self._trigger is not None and (caught := self._trigger.look(run, rows)) is not None:
+            self._trigger = None
+            self._reply(caught)
 
     # ---- requests
     def _take(self, data: str) -> None:

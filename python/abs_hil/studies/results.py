@@ -1,6 +1,4 @@
 """The results of a study: a row for each run, quantiles, maps, and Sobol's sensitivity indices."""
-from __future__ import annotations
-
 import gzip
 import json
 import os
@@ -8,17 +6,15 @@ import pathlib
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas
 
 from ..core import _core
 from ..files import write_whole
 from ..nesting import parse_json
 from ..places import how_to_install
-
-if TYPE_CHECKING:
-    import pandas
 
 #: what pip is asked for
 SALIB, PYARROW = '"SALib<1.5"', '"pyarrow<24"'
@@ -71,7 +67,6 @@ class StudyResults:
 
     def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Iterator[pandas.DataFrame]:
         """The rows as an iterator of DataFrames of at most `rows` rows: for studies that do not fit into the memory."""
-        import pandas
         with gzip.open(self.path, 'rb') as file, _whole(self.path):
             yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
                                        dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
@@ -80,7 +75,6 @@ class StudyResults:
 
     def columns(self, names: Sequence[str]) -> pandas.DataFrame:
         """Some columns of all rows, each once, one row a run, in order. Metrics of a run that has none are NaN."""
-        import pandas
         names = list(dict.fromkeys(names))
         if self._data is not None:
             return self._data[names]
@@ -90,7 +84,6 @@ class StudyResults:
 
     def _read(self, names: list[str]) -> dict[str, Any]:
         """Columns of all rows. Numbers are copied to their place piece by piece, so that nothing is in memory twice."""
-        import pandas
         numbers: dict[str, np.ndarray] = {}
         texts: dict[str, list[pandas.Series]] = {}
         row = 0
@@ -144,7 +137,6 @@ class StudyResults:
                   q: Sequence[float] = (0.1, 0.5, 0.9)) -> pandas.DataFrame:
         """Quantiles of metrics over the completed runs of each group: index (group, metric), columns `runs` (those that
         have the metric) and the quantiles. by: columns; default: `groups`."""
-        import pandas
         by = self.groups if by is None else [by] if isinstance(by, str) else list(by)
         wanted = [name for name in self.metrics if metrics is None or name in metrics]
         kept = dict(self._columns)
@@ -175,7 +167,6 @@ class StudyResults:
         """Sobol's sensitivity indices of a metric by SALib: columns S1 (first order), ST (total) and the half widths of
         their 95 % intervals; index: factors with ranges. For the design `saltelli` alone. Raises ValueError for another
         design, for runs that lack the metric, and if `where` leaves several groups."""
-        import pandas
         if self.facts['design'] != 'saltelli':
             raise ValueError(f'design {self.facts["design"]}: Sobol indices need the design saltelli')
         try:
@@ -224,7 +215,6 @@ class StudyResults:
 @contextmanager
 def _whole(path: pathlib.Path) -> Iterator[None]:
     """Says of rows that are cut or damaged what they are, instead of what a parser or a decompressor calls them."""
-    import pandas
     try:
         yield
     except (pandas.errors.ParserError, EOFError, zlib.error, gzip.BadGzipFile) as error:
@@ -243,7 +233,6 @@ def _binned(values: pandas.Series, bins: int) -> pandas.Series:
     part = np.searchsorted(edges, values, side='right')
     part -= 1
     np.clip(part, 0, bins - 1, out=part)
-    import pandas
     return pandas.Series((0.5 * (edges[:-1] + edges[1:]))[part], index=values.index, name=values.name)
 
 

@@ -5,7 +5,6 @@ import os
 import re
 import select
 import signal
-import sys
 import termios
 import time
 import tty
@@ -16,6 +15,7 @@ from rich.live import Live
 
 from ..core import _core, load_network
 from ..messages import decode
+from ..options import failed
 from .screen import Screen, draw, one_line
 from .view import RunView
 
@@ -46,8 +46,6 @@ class Ended(Exception):
 
 
 class Feed:
-    """Puts the messages of a run into its view."""
-
     def __init__(self, url: str, prefix: str, window_s: float) -> None:
         self.view = RunView(window_s)
         self._prefix = len(prefix)
@@ -151,13 +149,11 @@ def main(arguments: list[str]) -> int:
         try:
             feed = Feed(o.lcm_url, o.prefix, o.window)
         except (ValueError, OSError) as error:
-            print(f'abs_watch: {error}', file=sys.stderr)
-            return 3 if isinstance(error, OSError) else 2
+            return failed('abs_watch', error, 3 if isinstance(error, OSError) else 2)
         screen = Screen(*PICTURE, unicode, feed.url, f'{o.prefix}TELEMETRY')
         if o.once:
             if not one_picture(feed, screen, timeout_s):
-                print(f'abs_watch: no message arrived within {timeout_s:g} s on {screen.channel}', file=sys.stderr)
-                return 3
+                return failed('abs_watch', f'no message arrived within {timeout_s:g} s on {screen.channel}', 3)
         elif o.plain or not (os.isatty(0) and os.isatty(1)) or os.environ.get('TERM', 'dumb') in ('dumb', 'unknown', ''):
             in_lines(feed, screen)
         else:

@@ -43,11 +43,12 @@ def number(value: float, decimals: int) -> str:
     return f'{value:.{decimals}f}' if abs(value) < 1e6 else f'{value:.1e}'
 
 
-def flow(items: Iterable[tuple[str, str]], columns: int) -> list[Text]:
+def _flow(items: Iterable[tuple[str, str]], screen: Screen) -> list[Text]:
     """The items (text, style) side by side, two blanks between them, in as many lines as they need. Only an item that is
     longer than a line is broken, between its words."""
     lines: list[Text] = []
-    for text, style in items:
+    columns = screen.columns
+    for text, style in ((screen.words(text), style) for text, style in items):
         if lines and lines[-1].cell_len + 2 + cell_len(text) <= columns:
             lines[-1].append('  ').append(text, style)
             continue
@@ -110,10 +111,6 @@ def draw(view: RunView, now_s: float, screen: Screen) -> list[Text]:
     for line in lines:
         line.truncate(max(screen.columns, 0))
     return lines
-
-
-def _flow(items: Iterable[tuple[str, str]], screen: Screen) -> list[Text]:
-    return flow(((screen.words(text), style) for text, style in items), screen.columns)
 
 
 def _head(view: RunView, now_s: float, screen: Screen) -> list[Text]:

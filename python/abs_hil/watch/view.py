@@ -95,11 +95,8 @@ class RunView:
         if not self.buckets or after_gap or number != self.buckets[-1].number:
             self.buckets.append(Bucket(number, after_gap))
         bucket = self.buckets[-1]
-        for i, value in enumerate(self.values.values()):
-            if value < bucket.low[i]:
-                bucket.low[i] = value
-            if value > bucket.high[i]:
-                bucket.high[i] = value
+        bucket.low = list(map(min, bucket.low, self.values.values()))  # an unknown value is neither
+        bucket.high = list(map(max, bucket.high, self.values.values()))
 
     def _speed(self, wheel: str, true: float, estimated: float) -> float:
         if not math.isnan(true):
