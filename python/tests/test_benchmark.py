@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import gzip
 import json
 import math
@@ -162,6 +163,12 @@ def test_a_first_misreading_of_the_slip_does_not_fix_a_wrong_peak():
     found = run(Entry('adaptive-optimal', {}), [case], known, seeds=tuple(range(1, 13)))
     assert found.total.failed == 0
     assert found.total.excess_worst < 0.25
+    # Once this peak was taken for one at half its slip: the reference rested there, and the braking got 19 % longer.
+    coarse = cases.combined(20261129, 26)[25]
+    fine = dataclasses.replace(coarse, changes={**coarse.changes, 'encoder_counts_per_rev': 4096})
+    distances = [[row['stop_distance_m'] for row in run(Entry('adaptive-optimal', {}), [case], {bounds.identity(case): {
+        'distance_m': 1.0}}, seeds=tuple(range(1, 7))).rows] for case in (coarse, fine)]
+    assert max(distances[0]) < 1.12 * min(distances[1])
 
 
 def test_a_longer_draw_begins_with_the_same_cases():

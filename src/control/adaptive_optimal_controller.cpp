@@ -26,18 +26,24 @@ const AdaptiveOptimalOptions<>& checked(const AdaptiveOptimalOptions<>& o) {
   return o;
 }
 
-/// Coarser counts make the force, the first speeds and the loop noisier. The powers were chosen with the gains
-/// (docs/theory-beyond.md).
-AdaptiveOptimalOptions<> counted(AdaptiveOptimalOptions<> options, const rig::RigParameters& rig) {
-  constexpr double usual_counts_per_rev = 4096.0;
+/// Amplitude of the early search with coarse counts, as a part of the reference.
+constexpr double coarse_early_part = 0.5;
+
+/// How much coarser the counts are than those of 4096 a turn.
+double coarseness(const rig::RigParameters& rig) noexcept { return 4096.0 / rig.encoder_counts_per_rev; }
+
+/// Coarser counts make the force, the first speeds and the loop noisier, and show the peak later. The powers were
+/// chosen with the gains (docs/theory-beyond.md).
+AdaptiveOptimalOptions<> counted(AdaptiveOptimalOptions<> options, double coarser) {
   constexpr double most_search_part = 0.5;
-  const double coarser = usual_counts_per_rev / rig.encoder_counts_per_rev;
+  constexpr double least_start = 0.65;
   options.bank.force_noise_N2_s *= coarser * std::sqrt(std::sqrt(coarser));
   options.bank.zero_error_m_s *= coarser;
   if (coarser > 1.0) {
     options.bank.jump_least_N *= std::sqrt(coarser);
     options.bank.jump_slip_m_s *= std::sqrt(coarser);
     options.play_Nm *= std::sqrt(coarser);
+    options.slip_start *= std::max(least_start, 1.0 / std::sqrt(coarser));
     options.search_part = std::min(most_search_part, options.search_part * std::sqrt(coarser));
   }
   return options;
@@ -57,7 +63,7 @@ ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters
 template <class S>
 AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
   requires std::is_same_v<S, double>
-    : options_{counted(checked(context.options.adaptive_optimal), context.rig)},
+    : options_{counted(checked(context.options.adaptive_optimal), coarseness(context.rig))},
       laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -66,6 +72,7 @@ AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
       loop_{loop(options_, context.rig)},
       observer_{options_.observer, context.rig, context.options.rate_Hz},
       force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
+      early_part_{coarseness(context.rig) > 1.0 ? coarse_early_part : 0.0},
       learns_every_{std::max(1.0, std::round(context.options.rate_Hz / learning_rate_Hz))},
       bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
@@ -82,7 +89,7 @@ void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
                .swing_m_s = swing(input.disc_error_rad, input.speeds.omega2_rad_s).speed_m_s});
   speeds_.reset(input.speeds);
   reference_ = options_.slip_start;
-  model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
+  model_error_Nm_ = sent_Nm_ = search_rad_ = braked_s_ = 0.0;
   last_speeds_ = input.speeds;
   unlearnt_ = {};
 }

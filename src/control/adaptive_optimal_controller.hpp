@@ -85,6 +85,7 @@ class AdaptiveOptimalLaw {
   [[nodiscard]] typename Bank::Swing swing(const S& disc_error_rad, const S& omega_rad_s) const noexcept;
   [[nodiscard]] S peak_factor() const noexcept;
   [[nodiscard]] S near_gain_per_s() const noexcept;
+  [[nodiscard]] S search_part() const noexcept;
   [[nodiscard]] S next_reference(const S& dt_s) noexcept;
   [[nodiscard]] S holding_torque_Nm(const Speeds& speeds, const S& slip, const S& force_N) const noexcept;
   [[nodiscard]] Holding holding(const S& slip, const S& reference, const S& error_m_s) const noexcept;
@@ -103,11 +104,13 @@ class AdaptiveOptimalLaw {
   BasicWheelForceObserver<S> observer_{};
   BasicLowerWheelForce<S> force_{};
   BasicDelayedSpeeds<S> speeds_{};
+  S early_part_{0.0};    ///< amplitude of the early search at its start, as a part of the reference
   S learns_every_{1.0};  ///< cycles
   S step_s_{0.0};        ///< time of the last step of learning, and what of its distance the model's error covers then
   S error_covered_{0.0};
   S cycle_s_{0.0};  ///< time of the last cycle, and the largest factor of the reference in it
   S largest_rise_{1.0};
+  S braked_s_{0.0};  ///< time since braking began
   Bank bank_{};
   S reference_{0.0};       ///< slip of the peak, without search and zero
   S model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it

@@ -17,6 +17,9 @@ inline constexpr double known_spread = 0.15;
 inline constexpr double unknown_spread = 0.4;
 /// Part of a swing once a turn that the observer's force shows.
 inline constexpr double quick_passes = 0.5;
+// The early search begins when the first force has come through the filters, and fades.
+inline constexpr double early_from_s = 0.06;
+inline constexpr double early_lasts_s = 0.08;
 
 }  // namespace adaptive_optimal
 
@@ -84,6 +87,17 @@ S AdaptiveOptimalLaw<S>::peak_factor() const noexcept {
   return rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
 }
 
+/// Where the slip runs away behind the peak, a search passes the peak and costs more than it finds. But the first noise
+/// of coarse counts may show a peak at far too small a slip, and a slip that rests there never shows another one.
+template <class S>
+S AdaptiveOptimalLaw<S>::search_part() const noexcept {
+  using namespace adaptive_optimal;
+  const S part = options_.search_part * rig::larger(S(0.0), S(1.0 - bank_.runaway()));
+  if (!rig::any(early_part_ > 0.0)) return part;
+  return part + rig::select(braked_s_ > early_from_s, S(early_part_ * rig::exponential(S(-braked_s_ / early_lasts_s))),
+                            S(0.0));
+}
+
 template <class S>
 S AdaptiveOptimalLaw<S>::next_reference(const S& dt_s) noexcept {
   const S target = rig::clamped(S(peak_factor() * bank_.peak_slip()), options_.slip_min, options_.slip_max);
@@ -94,10 +108,8 @@ S AdaptiveOptimalLaw<S>::next_reference(const S& dt_s) noexcept {
   // A peak that turns out to be near must not be passed: only a rise takes time.
   reference_ = rig::smaller(target, reference_ * largest_rise_);
   search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
-  // Where the slip runs away behind the peak, a search passes the peak and costs more than it finds.
-  const S part = options_.search_part * rig::larger(S(0.0), S(1.0 - bank_.runaway()));
-  const S search = part * rig::sine(search_rad_);
-  return reference_ * (1.0 + search) - bank_.slip_zero();
+  braked_s_ += dt_s;
+  return reference_ * (1.0 + search_part() * rig::sine(search_rad_)) - bank_.slip_zero();
 }
 
 template <class S>
