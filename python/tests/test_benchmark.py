@@ -4,6 +4,7 @@ from __future__ import annotations
 import base64
 import dataclasses
 import gzip
+import importlib.util
 import json
 import math
 import os
@@ -206,9 +207,15 @@ def test_a_run_that_fails_has_no_distance(own_laws):
     assert math.isnan(broken.total.excess_mean)
 
 
-@pytest.mark.parametrize(('law', 'words'), [('Raising', "ValueError: no bad input, but the law's own\n"), ('Ending', '')])
-def test_a_law_that_ends_fails_and_the_others_have_their_scores(law, words, own_laws, tmp_path, capfd, monkeypatch):
+#: what Raising raises
+WORDS = "ValueError: no bad input, but the law's own\n"
+
+
+@pytest.mark.parametrize(('law', 'words', 'wheel'), [('Raising', WORDS, False), ('Raising', WORDS, True), ('Ending', '', False)])
+def test_a_law_that_ends_fails_and_the_others_have_their_scores(law, words, wheel, own_laws, tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(cases, 'quick_cases', few)
+    if wheel:
+        monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
     target = tmp_path / 'score.json'
     names = ['--controller', f'pi,own_laws:{law}']
     assert main(['--quick', *names, '--json', str(target)]) == 0

@@ -93,11 +93,11 @@ def _in_this_process(run: dict[str, Any]) -> Study:
     return study
 
 
-def _results(entry: Entry, runs: list[dict[str, Any]], threads: int) -> Mapping[str, np.ndarray]:
+def _results(entry: Entry, runs: list[dict[str, Any]], threads: int) -> Study:
     if not entry.without_host:
         return simulate_many(runs, threads=threads)
     studies = [_in_this_process(run) for run in runs]
-    return {name: np.concatenate([study[name] for study in studies]) for name in (*FIGURES, 'fault')}
+    return Study({name: np.concatenate([study[name] for study in studies]) for name in (*FIGURES, 'fault')})
 
 
 def _column(heading: str, decimals: int = 0, scale: float = 1.0) -> dict[str, Any]:
