@@ -83,7 +83,7 @@ inline constexpr std::array<Figure, 16> figures{{
     {"stop_distance_m", &Metrics::stop_distance_m, "stop distance", "m", 2, Better::less, true, 3,
      "trapezoid of v_x over the ticks between", lacking::stop},
     {"slip_rms", &Metrics::slip_rms, "slip RMS error", "", 4, Better::less, true, 4,
-     "of slip − slip_ref, from the cycle at 0.3 s after brake start, or the next, on and v_x > 3 m/s",
+     "of slip − slip_ref, from 0.3 s after brake start on, to a cycle, and v_x > 3 m/s",
      "no braking above {judged:.3g} m/s later than {rms_start} s after its start"},
     {"slip_reached_s", &Metrics::slip_reached_s, "slip reached", "s", 3, Better::less, false, 5,
      "time after which slip is within 0.02 of its reference for the first time, while v_x > 3 m/s",

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "abs_hil/rig/brake_map.hpp"
@@ -151,33 +152,20 @@ double highest(const experiment::Profile& profile, double constant) {
   return most;
 }
 
-/// What has passed in the phase at least when its condition holds: the time (`kind` is duration) or the distance.
-double passed_at(const experiment::EndCondition& end, EndKind kind) {
-  const bool counts = end.kind == kind || (end.kind == EndKind::upper_wheel_peak && kind == EndKind::duration);
-  double least = counts ? end.value : 0.0;
-  for (const experiment::EndCondition& part : end.parts) least = std::max(least, passed_at(part, kind));
+/// What a condition alone tells of the run when it holds; 0: nothing.
+using Reached = std::function<double(const experiment::EndCondition&)>;
+
+/// What has been reached at least when a condition holds, with its parts.
+double reached_at(const experiment::EndCondition& end, const Reached& reached) {
+  double least = reached(end);
+  for (const experiment::EndCondition& part : end.parts) least = std::max(least, reached_at(part, reached));
   return least;
 }
 
 /// The same at the end of the phase, which any of its conditions may bring.
-double passed_in(const experiment::PhasePlan& phase, EndKind kind) {
+double reached_in(const experiment::PhasePlan& phase, const Reached& reached) {
   double least = std::numeric_limits<double>::infinity();
-  for (const experiment::EndCondition& end : phase.ends_on) least = std::min(least, passed_at(end, kind));
-  return least;
-}
-
-/// The wheel speed that has been reached at least when a condition holds.
-double speed_at(const experiment::EndCondition& end, double r2_m) {
-  double least = 0.0;
-  if (end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above) least = end.value;
-  if (end.kind == EndKind::car_speed_above) least = end.value / r2_m;
-  for (const experiment::EndCondition& part : end.parts) least = std::max(least, speed_at(part, r2_m));
-  return least;
-}
-
-double speed_in(const experiment::PhasePlan& phase, double r2_m) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const experiment::EndCondition& end : phase.ends_on) least = std::min(least, speed_at(end, r2_m));
+  for (const experiment::EndCondition& end : phase.ends_on) least = std::min(least, reached_at(end, reached));
   return least;
 }
 
@@ -287,15 +275,25 @@ std::vector<std::string> certain_faults(const Plan& plan, const Settings& s) {
     problems.push_back(fmt::format("{} at least {:.6g} {}, but {} is {:.6g} {}: every run ends as a fault; change one",
                                    what, least, unit, limit, most, unit));
   };
+  const auto passed_s = [](const experiment::EndCondition& end) {
+    return end.kind == EndKind::duration || end.kind == EndKind::upper_wheel_peak ? end.value : 0.0;
+  };
+  const auto passed_m = [](const experiment::EndCondition& end) {
+    return end.kind == EndKind::distance ? end.value : 0.0;
+  };
+  const auto speed_rad_s = [&s](const experiment::EndCondition& end) {
+    if (end.kind == EndKind::car_speed_above) return end.value / s.model.wheels.r2_m;
+    return end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above ? end.value : 0.0;
+  };
   double time_s = 0.0;
   double distance_m = 0.0;
   for (const experiment::PhasePlan& phase : plan.phases) {
-    const double lasts_s = passed_in(phase, EndKind::duration);
+    const double lasts_s = reached_in(phase, passed_s);
     compare(fmt::format("phase \"{}\" lasts", phase.name), lasts_s, "its at_most_s", phase.time_limit_s, "s");
-    compare(fmt::format("phase \"{}\" waits for a wheel speed of", phase.name), speed_in(phase, s.model.wheels.r2_m),
+    compare(fmt::format("phase \"{}\" waits for a wheel speed of", phase.name), reached_in(phase, speed_rad_s),
             "limits.wheel_speed_rad_s (gate.overspeed_rad_s)", s.gate.overspeed_rad_s, "rad/s");
     time_s += lasts_s;
-    distance_m += passed_in(phase, EndKind::distance);
+    distance_m += reached_in(phase, passed_m);
   }
   compare("the run lasts", time_s, "limits.run_time_s", plan.limits.run_time_s, "s");
   compare("the car goes", distance_m, "limits.distance_m", plan.limits.distance_m, "m");
