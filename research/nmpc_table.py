@@ -38,8 +38,9 @@ TRIED = {'recourse_per_s': (0.0, 60.0, 120.0, 480.0), 'caution': (0.0, 1.0, 2.0,
 
 @dataclasses.dataclass(frozen=True)
 class Made(Entry):
-    """An entry whose object needs to know the case."""
+    """An entry whose object needs to know the case, and so runs in this process."""
     make: Callable[[], object] = object
+    without_host = True
 
     def made(self):
         return self.make()

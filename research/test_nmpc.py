@@ -7,8 +7,10 @@ import pytest
 ca = pytest.importorskip('casadi')
 
 import nmpc  # noqa: E402
+import nmpc_table  # noqa: E402
 
 import abs_hil  # noqa: E402
+from abs_hil.benchmark import bounds, cases  # noqa: E402
 
 START = {'experiment.start_speed_rad_s': 170.0, 'experiment.coast_s': 0.5, 'experiment.end_speed_m_s': 0.3}
 
@@ -123,3 +125,11 @@ def test_it_brakes_and_where_no_solve_converges_it_is_the_shadow(functions):
     shadow = brake('adaptive-optimal').summary
     assert brake(controller).summary['stop_distance_m'] == shadow['stop_distance_m']
     assert controller.failures == controller.solves > 1000
+
+
+def test_the_benchmark_scores_its_objects():
+    # The table's way: each case has an object of its own, in this process, that is asked for its counts afterwards.
+    chosen = min(cases.whole_set(), key=lambda case: case.start_speed_rad_s)
+    rows, made = nmpc_table.braked([chosen], bounds.stored(), nmpc.Tuning())
+    assert [row['fault'] for row in rows] == [''] and -1e-3 < rows[0]['excess'] < 0.2
+    assert len(made) == 1 and made[0].solves > 10

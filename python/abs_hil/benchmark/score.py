@@ -52,6 +52,10 @@ class Entry:
         return (':' in self.name and not self.name.endswith(('.so', '.fmu'))
                 and importlib.util.find_spec('abs_hil._network') is None)
 
+    def made(self) -> Any:
+        """The controller of a run in this process."""
+        return made(self.name)
+
 
 def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
     nominal = {plant: {name: row['value'] for name, row in keys(plant=plant).items()} for plant in {case.plant for case in cases}}
@@ -80,13 +84,13 @@ def keeps(entry: Entry, case: Case) -> bool:
 FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSHOOT, 'slip_largest', 'time_locked_s')
 
 
-def _in_this_process(run: dict[str, Any]) -> Study:
+def _in_this_process(entry: Entry, run: dict[str, Any]) -> Study:
     """What the law raises is the fault that it is in a process of its own."""
-    law = made(run['controller'])
+    law = entry.made()
     try:
         study = simulate_many([{**run, 'controller': law}], keep_going=True)
     except Exception as error:
-        print(f'{run["controller"]}: {"".join(traceback.format_exception_only(error)).strip()}', file=sys.stderr)
+        print(f'{entry.name}: {"".join(traceback.format_exception_only(error)).strip()}', file=sys.stderr)
         return Study({**dict.fromkeys(FIGURES, np.array([math.nan])), 'fault': np.array(['controller_not_finite'], dtype=object)})
     if study['error'][0]:
         raise ValueError(study['error'][0])
@@ -96,7 +100,7 @@ def _in_this_process(run: dict[str, Any]) -> Study:
 def _results(entry: Entry, runs: list[dict[str, Any]], threads: int) -> Study:
     if not entry.without_host:
         return simulate_many(runs, threads=threads)
-    studies = [_in_this_process(run) for run in runs]
+    studies = [_in_this_process(entry, run) for run in runs]
     return Study({name: np.concatenate([study[name] for study in studies]) for name in (*FIGURES, 'fault')})
 
 
