@@ -5,11 +5,12 @@
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
 median error, the share of intervals of 95 % that hold the truth, how well the identified model predicts `paper`, how far the
-tyre's curve is off, and how far controllers that believe the model stop from where they stop with the true one.
+tyre's curve is off, how far controllers that believe the model stop from where they stop with the true one, and a
+simulation-based calibration: where in their intervals the truths lie.
 --disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
 --more: experiments of which there is one log more each.
 --check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
-the intervals of all parameters together hold the truth as often as intervals of 95 % do.
+the intervals of all parameters together hold the truth as often as intervals of 95 % do, and the ranks are uniform.
 --keep: stores each rig's results in FOLDER, and takes those that it finds there, so that an interrupted study goes on.
 --page: prints the table of docs/identification.md instead, of all the rigs that PAGE names.
 """
@@ -30,6 +31,7 @@ import scipy.stats  # noqa: E402
 import abs_hil  # noqa: E402
 from abs_hil.identification import identify  # noqa: E402
 from abs_hil.identification.advice import log_of  # noqa: E402
+from abs_hil.identification.intervals import WIDTH  # noqa: E402
 from abs_hil.identification.parameters import FORMS  # noqa: E402
 from abs_hil.identification.results import as_toml, braking_force_N, equivalent_tyre, plant_settings  # noqa: E402
 
@@ -125,6 +127,7 @@ def measured(plant, seed, disturbed, more):
         row[f'{key} error'] = estimate.value / value - 1 if estimate else np.nan
         row[f'{key} holds'] = np.nan if estimate is None or estimate.low is None else float(
             estimate.low <= value <= estimate.high)
+        row[f'{key} rank'] = rank(estimate if key != 'u0' else None, value)
         row[f'{key} half width'] = np.nan if estimate is None or estimate.low is None else (
             estimate.high - estimate.low) / 2 / abs(value)
         row[f'{key} status'] = estimate.status if estimate else 'other form'
@@ -139,6 +142,15 @@ def force_apart(settings, form, found):
     truth = {key: settings[f'plant.{key}'] for key in found.values() if f'plant.{key}' in settings}
     true = braking_force_N(base, truth)
     return np.abs(braking_force_N(base, found.values()) - true).max() / true.max()
+
+
+def rank(estimate, truth):
+    """The share of the estimate's distribution (normal, by its interval of 95 %) that lies below the truth, 0 to 1; NaN without
+    an interval. If the intervals are right, the ranks of many rigs are uniform: simulation-based calibration (Talts and others,
+    arXiv 1804.06788). The interval of u0 lies between duties and has no such distribution."""
+    if estimate is None or estimate.low is None or estimate.high <= estimate.low:
+        return np.nan
+    return float(scipy.stats.norm.cdf((2 * truth - estimate.low - estimate.high) / (estimate.high - estimate.low) * WIDTH))
 
 
 def stopped_apart(controller, settings, form, found, model):
@@ -176,11 +188,34 @@ def table(plant, rows):
         print(f'| `{key}` | {np.nanmedian(errors):.1e} | {np.nanmax(errors):.1e} | {share} | {identified} |')
 
 
+def ranks_of(rows):
+    """parameter -> its ranks, shape (rigs with an interval,)."""
+    keys = sorted({name.removesuffix(' rank') for row in rows for name in row if name.endswith(' rank')})
+    ranks = {key: np.array([row.get(f'{key} rank', np.nan) for row in rows], dtype=float) for key in keys}
+    return {key: one[np.isfinite(one)] for key, one in ranks.items() if np.isfinite(one).any()}
+
+
+def within(ranks):
+    """The shares of ranks in the middle 50, 80 and 95 %, in per cent."""
+    return [100 * float(np.mean(np.abs(ranks - 0.5) <= share / 2)) for share in (0.5, 0.8, 0.95)]
+
+
+def calibration(rows):
+    """Prints, for each parameter, how often intervals of 50, 80 and 95 % hold the truth, and how likely uniform ranks would be
+    as far from uniform (Kolmogorov, Smirnov). Returns the parameters of which chance would make that once in 1,000 studies."""
+    print('\n| parameter | rigs | in 50 % | in 80 % | in 95 % | chance of such ranks |\n|---|---|---|---|---|---|')
+    every = ranks_of(rows)
+    chances = {key: float(scipy.stats.kstest(ranks, 'uniform').pvalue) for key, ranks in every.items()}
+    for key, ranks in every.items():
+        shares = ' | '.join(f'{share:.0f} %' for share in within(ranks))
+        print(f'| `{key}` | {len(ranks)} | {shares} | {chances[key]:.2g} |')
+    return [key for key, chance in chances.items() if chance * len(chances) < 1e-3]
+
+
 def page_rows(rows_of, disturbed):
     """Lines of the page's table. rows_of: plant -> rows."""
-    holds = np.array([row[name] for rows in rows_of.values() for row in rows for name in row if name.endswith(' holds')])
-    holds = holds[np.isfinite(holds)]
-    together = (f'{100 * holds.mean():.1f} % of {len(holds):,},', 'all three', 'together')
+    ranks = np.concatenate(list(ranks_of([row for rows in rows_of.values() for row in rows]).values()))
+    together = (', '.join(f'{share:.1f}' for share in within(ranks)), f'of {len(ranks):,},', 'all three together')
     for (plant, rows), words in zip(rows_of.items(), together):
         distance, force = (100 * np.abs([row[name] for row in rows]) for name in ('distance_error', 'force apart'))
         rms = np.median([row['rms_counts'] for row in rows])
@@ -196,7 +231,7 @@ def page(o):
         lines = [line for disturbed, of in jobs
                  for line in page_rows({plant: [job.result() for job in runs] for plant, runs in of.items()}, disturbed)]
     head = ('median (worst)', 'rigs', 'residual, counts RMS', 'stop distance of `paper` predicted within %',
-            "tyre's force in braking within %", 'intervals of 95 % that hold the truth')
+            "tyre's force in braking within %", '% of the intervals of 50, 80, 95 % that hold the truth')
     print('\n'.join([f'| {" | ".join(head)} |', '|' + '---|' * len(head), *lines]))
 
 
@@ -254,6 +289,7 @@ def main():
             if rows:
                 table(plant, rows)
             every += rows
+    skewed = calibration(every) if every else []
     if o.csv and every:
         names = list(dict.fromkeys(name for row in every for name in row))
         with open(o.csv, 'w', newline='', encoding='utf-8') as file:
@@ -262,6 +298,7 @@ def main():
             writer.writerows(every)
     if o.check:
         found = problems(every, o.repetitions * len(o.plants.split(',')))
+        found += [f'the ranks of {key} are not uniform' for key in skewed]
         sys.exit('; '.join(found) if found else 0)
 
 

@@ -24,7 +24,7 @@ check_shell() {
 }
 
 check_python() {
-  scripts/setup_python.sh && build/python/bin/ruff check python research/claim research/{test_claim,unknown,certificate,layers,dense,test_dense,test_unknown,unknown_table,nmpc,nmpc_table,test_nmpc,reproduce,steps,test_reproduce,quoted,drawn_table}.py && build/python/bin/python -m mypy
+  scripts/setup_python.sh && build/python/bin/ruff check python research/claim research/{test_claim,unknown,certificate,layers,dense,test_dense,test_unknown,unknown_table,nmpc,nmpc_table,test_nmpc,test_identification_study,reproduce,steps,test_reproduce,quoted,drawn_table}.py && build/python/bin/python -m mypy
 }
 
 check_cppcheck() {
