@@ -47,7 +47,7 @@ WANDER_S = 0.2
 
 #: of the page's table: disturbed, rigs of each plant, plants
 PAGE = ((False, 60, ('paper-table1', 'paper-timing', 'inteco-manual')),
-        (True, 40, ('paper-timing', 'paper-table1', 'inteco-manual')))
+        (True, 30, ('paper-timing', 'paper-table1', 'inteco-manual')))
 
 
 def values_of(plant):
