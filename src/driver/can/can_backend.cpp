@@ -7,11 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "driver/board_options.hpp"
-#include "driver/can/bus.hpp"
 #include "driver/can/can_driver.hpp"
-#include "driver/can/can_safe_state.hpp"
-#include "driver/can/interface_facts.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/own_handle_writer.hpp"
 #include "rig/formatted_text.hpp"
@@ -34,7 +30,7 @@ std::unique_ptr<SafeStateWriter> make_can_writer(const CanOptions& options, cons
   const std::string prefix(unix_prefix);
   const bool socket = options.interface.starts_with(prefix);
   const std::string file = socket ? options.interface.substr(prefix.size()) : "/sys/class/net/" + options.interface;
-  return std::make_unique<CanSafeState>(
+  return safe_state_writer(
       [options, again = Reopening{file}]() mutable { return again.due() ? open_link(options, false) : Link{}; },
       socket);
 }

@@ -43,6 +43,8 @@ struct CanCounters {
   std::int64_t longest_answer_ns{0};
 };
 
+using OpenLink = std::function<Link()>;
+
 /// The rig behind a CAN I/O node (docs/can.md). Not verified on hardware.
 ///
 /// One cycle: `read` sends ABS_SYNC and waits for the answer, at most `driver.can.answer_timeout_us`; `write` sends
@@ -51,7 +53,6 @@ struct CanCounters {
 /// `write` with its own reason. Without commands the node's watchdog zeroes the outputs.
 class CanDriver final : public BoardDriver {
  public:
-  using OpenLink = std::function<Link()>;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link  called by `configure`; throws Unavailable
   /// @param lock_step  this driver advances the time of the node, which must be an emulator in lock-step
@@ -154,5 +155,13 @@ class CanDriver final : public BoardDriver {
   Duties applied_{};
   std::uint8_t applied_sequence_{0};
 };
+
+/// Makes the writer of a CAN node's safe state: it sends the request to deactivate, and zeros, without any handshake,
+/// and waits afterwards until the node reports that it is inactive with both outputs 0. A bus takes more than one
+/// socket, so this one is open beside the owner's. An emulator's socket takes one peer only, so it is opened after the
+/// owner's end.
+/// @param open_link  does not wait
+/// @param one_peer   the link takes one peer only
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(OpenLink open_link, bool one_peer);
 
 }  // namespace abs_hil::driver::can

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "driver/hm2/hm2_driver.hpp"
-#include "driver/hm2/hm2_safe_state.hpp"
 #include "driver/monotonic_time.hpp"
 #include "rig/formatted_text.hpp"
 
@@ -28,7 +27,7 @@ std::unique_ptr<RigDriver> make_driver(const Hm2Options& options, const RunFacts
 }
 
 std::unique_ptr<SafeStateWriter> make_writer(const Hm2Options& options, const RunFacts& /*run*/) {
-  return std::make_unique<Hm2SafeState>(options, opener(options));
+  return safe_state_writer(options, opener(options));
 }
 
 /// Nothing but an emulator answers at this computer's own address.

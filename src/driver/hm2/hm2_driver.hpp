@@ -155,4 +155,10 @@ class Hm2Driver final : public BoardDriver {
   Counters counters_{};
 };
 
+/// Makes the writer that drops all outputs of a HostMot2 board from a second process, through a socket of its own: one
+/// datagram `PWM 0, enable 0, watchdog bites now`, then a look whether the direction of all pins is 0. The board
+/// answers to each sender, so it works beside the owner; but an owner takes its datagrams for another program's.
+/// @param open_link  throws Unavailable
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(const Hm2Options& options, OpenLink open_link);
+
 }  // namespace abs_hil::driver::hm2

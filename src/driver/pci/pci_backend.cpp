@@ -2,12 +2,8 @@
 
 #include <filesystem>
 
-#include "driver/board_options.hpp"
 #include "driver/monotonic_time.hpp"
-#include "driver/pci/discovery.hpp"
 #include "driver/pci/pci_driver.hpp"
-#include "driver/pci/pci_safe_state.hpp"
-#include "driver/pwm.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
@@ -22,10 +18,6 @@ std::unique_ptr<RigDriver> make_pci_driver(const PciOptions& options, const RunF
   return std::make_unique<PciDriver>(
       pci, [pci, lock_step = run.lock_step] { return open_card(pci, lock_step); },
       run.lock_step ? nullptr : monotonic_ns);
-}
-
-std::unique_ptr<SafeStateWriter> make_pci_writer(const PciOptions& options, const RunFacts& run) {
-  return std::make_unique<PciSafeState>(options, run.beside_guardian);
 }
 
 bool is_of_the_kernel(const std::filesystem::path& file) {
@@ -66,7 +58,7 @@ Backend pci_backend() {
       .not_verified = "The register map comes from the maker's documents and has been tested only with an emulator. Do "
                       "the checks of docs/rig-setup.md with abs_hil commission",
       .make_driver = make_pci_driver,
-      .make_safe_state_writer = make_pci_writer,
+      .make_safe_state_writer = safe_state_writer_of,
       .outputs = pwm_grid<PciOptions>,
       .reality = pci_reality,
       .find = survey_cards,

@@ -111,4 +111,13 @@ class PciDriver final : public BoardDriver {
   std::size_t next_setting_{0};
 };
 
+using OpenWindow = std::function<std::unique_ptr<RegisterWindow>()>;
+/// Makes the writer that sets both PWMs of the RT-DAC4/PCI to width 0, then reads both back. Index and data are two
+/// accesses. A live owner between them could send a width to the wrong PWM, or undo the safe state with its next width.
+/// Use it only when the owner no longer writes, or writes only zeros.
+/// @param full_width  of a PWM: it also looks at both before it sets them; 0: it does not look
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(OpenWindow open_window, std::uint32_t full_width = 0);
+/// For the card that the options select, through sysfs. Beside a guardian, which writes zeros as well, it also looks.
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer_of(const PciOptions& options, const RunFacts& run);
+
 }  // namespace abs_hil::driver::pci

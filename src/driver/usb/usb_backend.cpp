@@ -4,15 +4,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "driver/board_options.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/own_handle_writer.hpp"
-#include "driver/pwm.hpp"
-#include "driver/usb/discovery.hpp"
-#include "driver/usb/urb_link.hpp"
 #include "driver/usb/usb_driver.hpp"
-#include "driver/usb/usb_safe_state.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
@@ -29,7 +24,7 @@ std::unique_ptr<RigDriver> make_usb_driver(const UsbOptions& options, const RunF
 }
 
 std::unique_ptr<SafeStateWriter> make_usb_writer(const UsbOptions& options, const RunFacts& run) {
-  return std::make_unique<UsbSafeState>(options, [options, run, again = Reopening{}]() mutable {
+  return safe_state_writer(options, [options, run, again = Reopening{}]() mutable {
     if (!again.due()) return Board{};
     Board board = open_board(options, false, run.emulated);
     again.found(options.sysfs_root + '/' + board.address);
