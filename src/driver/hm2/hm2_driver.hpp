@@ -1,6 +1,6 @@
 #pragma once
 
-// The driver of a HostMot2 board: its lifecycle (hm2_driver.cpp) and its cycle (hm2_cycle.cpp).
+// The driver of a HostMot2 board: its lifecycle and texts (hm2_driver.cpp), its cycle (hm2_cycle.cpp).
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include "abs_hil/driver/backend.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
-#include "driver/hm2/board.hpp"
+#include "driver/hm2/wire.hpp"
 
 namespace abs_hil::driver::hm2 {
 
