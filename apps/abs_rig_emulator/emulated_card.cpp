@@ -18,7 +18,7 @@
 #include <utility>
 
 #include "control.hpp"
-#include "driver/pci/discovery.hpp"
+#include "driver/pci/wire.hpp"
 #include "emulator/register_faults.hpp"
 #include "runtime/clock.hpp"
 

@@ -14,7 +14,6 @@
 #include "driver/hm2/hm2_driver.hpp"
 #include "driver/own_handle_writer.hpp"
 #include "driver/pci/pci_driver.hpp"
-#include "driver/pci/register_map.hpp"
 #include "driver/usb/usb_driver.hpp"
 #include "emulator/can_node.hpp"
 #include "hm2/register_board.hpp"

@@ -8,11 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "driver/board_kit.hpp"
-#include "driver/board_options.hpp"
-#include "driver/pci/discovery.hpp"
-#include "driver/pci/register_map.hpp"
-#include "driver/pwm.hpp"
+#include "driver/pci/wire.hpp"
 
 namespace abs_hil::driver::pci {
 

@@ -1,7 +1,7 @@
-// Names of the card's registers, and the speed that its own counter shows.
-#include "driver/pci/register_map.hpp"
-
+// The card's registers, and the speed that its own counter shows.
 #include <numbers>
+
+#include "driver/pci/wire.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -69,13 +69,6 @@ constexpr std::array table{
 }  // namespace
 
 std::span<const Register> registers() noexcept { return table; }
-
-std::string_view register_name(std::uint32_t offset) noexcept {
-  for (const Register& entry : table) {
-    if (entry.offset == offset) return entry.name;
-  }
-  return "unknown register";
-}
 
 double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept {
   if (period_ticks == 0) return std::numeric_limits<double>::quiet_NaN();

@@ -1,7 +1,6 @@
 // Puts outputs into a frame and takes measurements out of one.
-#include "driver/usb/frame.hpp"
-
 #include "driver/pwm.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
 

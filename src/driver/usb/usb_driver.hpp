@@ -7,11 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "driver/board_kit.hpp"
-#include "driver/board_options.hpp"
 #include "driver/pwm.hpp"
-#include "driver/usb/frame.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -66,7 +66,7 @@ class ModelWindow final : public driver::pci::RegisterWindow {
   ModelCard& card_;
 };
 
-class ModelTime final : public driver::pci::EmulatedTime {
+class ModelTime final : public driver::EmulatedTime {
  public:
   explicit ModelTime(ModelCard& card) : card_(card) {}
   driver::IoResult now(std::int64_t& time_ns) noexcept override {
