@@ -12,9 +12,7 @@
 #include <stdexcept>
 
 #include "control.hpp"
-#include "emulator/hm2_board.hpp"
 #include "emulator/hm2_link.hpp"
-#include "emulator/node_board.hpp"
 
 namespace abs_hil::program {
 
@@ -40,7 +38,7 @@ sockaddr_in address_in(const std::string& text) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   if (::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) != 1) refuse("not an IPv4 address");
-  std::uint16_t port = emulator::Hm2Board::port;
+  std::uint16_t port = emulator::hm2_port;
   if (colon != std::string::npos) {
     const char* const end = text.data() + text.size();
     const auto [at, error] = std::from_chars(text.data() + colon + 1, end, port);
@@ -84,11 +82,6 @@ emulator::Hm2Options board_options(const EmulatorOptions& options, const sockadd
   return board;
 }
 
-std::unique_ptr<emulator::UdpBoard> make_board(const emulator::Hm2Options& options, bool node) {
-  if (node) return std::make_unique<emulator::NodeBoard>(options);
-  return std::make_unique<emulator::Hm2Board>(options);
-}
-
 /// The 7I92T or the node behind a UDP socket: time, cable, logs and the control commands.
 class EmulatedHm2 final : public EmulatedBoard {
  public:
@@ -97,7 +90,7 @@ class EmulatedHm2 final : public EmulatedBoard {
         address_text_(is_node_ ? options.node_address : options.hm2_address),
         address_(address_in(address_text_)),
         options_(board_options(options, address_)),
-        board_(make_board(options_, is_node_)),
+        board_(is_node_ ? emulator::node_board(options_) : emulator::hm2_board(options_)),
         link_(options.seed),
         time_(options_.lock_step, options.truth_file) {
     if (socket_.get() < 0 ||

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -89,5 +90,22 @@ class UdpBoard : public RigBehind {
   OutputLog log_{};
   std::uint64_t writes_{0};
 };
+
+inline constexpr std::uint16_t hm2_port = 27181;
+inline constexpr std::size_t largest_hm2_answer = 1472;
+
+/// The Mesa 7I92T as a host sees it through UDP: LBP16 commands in a datagram, their answers in another one. Where the
+/// documents are silent this project chose: a command that the space does not take reads as zeros and counts as an
+/// error; a datagram that breaks off, or whose answer would not fit into a packet, is obeyed up to that command.
+///
+/// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
+/// advances the time by a write of all 8 bytes.
+/// Throws std::invalid_argument if an option is outside its range.
+[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options);
+
+/// The node of docs/node.md: the core of its firmware, and the simulated rig behind its pins. Takes plant, start speed,
+/// MAC, address, lock-step and channels from `options`. A name that begins with "7I92" makes it present itself as that
+/// board. Throws std::invalid_argument as UdpBoard does.
+[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const Hm2Options& options);
 
 }  // namespace abs_hil::emulator
