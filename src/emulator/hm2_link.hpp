@@ -19,18 +19,7 @@ class Hm2Link {
  public:
   explicit Hm2Link(std::uint64_t seed) : random_(seed) {}
 
-  /// Sets a fault:
-  ///   ok               heals all of them
-  ///   loss=PERCENT     each datagram of both directions is lost with this probability
-  ///   lose-requests=N  the next N requests are lost
-  ///   lose-answers=N   the next N answers are lost
-  ///   delay=US         every answer comes later
-  ///   reorder          answers leave in pairs, the later one first
-  ///   duplicate        every answer comes twice
-  ///   stale            the answer before comes in place of each
-  ///   short=BYTES      answers end after these bytes
-  ///   garbage          every answer is random bytes of its length
-  /// Throws std::invalid_argument with the valid faults.
+  /// Sets a fault such as "loss=5". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text);
   /// Pulls or plugs the cable. What was under way is lost.
   void plug(bool in);
@@ -47,16 +36,16 @@ class Hm2Link {
 
  private:
   enum class Kind : std::uint8_t {
-    ok,
-    loss,
-    lose_requests,
+    ok,             ///< heals all of them
+    loss,           ///< each datagram of both directions is lost with this probability
+    lose_requests,  ///< the next ones are lost, as many as the number says
     lose_answers,
-    delay,
-    reorder,
-    duplicate,
-    stale,
-    too_short,
-    garbage
+    delay,      ///< every answer comes later
+    reorder,    ///< answers leave in pairs, the later one first
+    duplicate,  ///< every answer comes twice
+    stale,      ///< the answer before comes in place of each
+    too_short,  ///< answers end after so many bytes
+    garbage,    ///< every answer is random bytes of its length
   };
   struct Waiting {
     std::int64_t due_ns{0};
