@@ -28,6 +28,13 @@ constexpr std::array<std::uint8_t, 28> drives_the_brake{
     0x81, 0xC2, 0x00, 0x0E, 0x00, 0x00, 0x00, 0x5A,                          // reload the watchdog
     0x82, 0xD1, 0x14, 0x00, 0xEF, 0xBE, 0xAD, 0xDE};                         // its write number
 
+struct Talker {
+  std::string_view name;
+  std::span<const std::uint8_t> says;
+};
+constexpr std::array<Talker, 4> talkers{
+    {{"off", {}}, {"read", reads_the_clock}, {"write", writes_its_number}, {"drive", drives_the_brake}}};
+
 /// "ADDRESS" or "ADDRESS:PORT".
 sockaddr_in address_in(const std::string& text) {
   const auto refuse = [&text](const std::string& why) {
@@ -152,8 +159,6 @@ class EmulatedHm2 final : public EmulatedBoard {
   [[nodiscard]] emulator::UdpBoard& model() noexcept { return *board_; }
 
  private:
-  enum class Talker : std::uint8_t { off, read, write, drive };
-
   void send_due() {
     for (const emulator::Hm2Datagram& answer : link_.take_due(driver::monotonic_ns())) {
       sockaddr_in to{};
@@ -166,17 +171,14 @@ class EmulatedHm2 final : public EmulatedBoard {
   }
   void log_events() { take_log(board_->log(), time_.start_ns(), changes_.is_open() ? &changes_ : nullptr); }
   void talk() {
-    if (talker_ == Talker::off || board_->time_ns() < talks_ns_) return;
+    if (talker_.empty() || board_->time_ns() < talks_ns_) return;
     talks_ns_ = board_->time_ns() + talks_every_ns;
-    if (talker_ == Talker::read) static_cast<void>(board_->answer(reads_the_clock));
-    if (talker_ == Talker::write) static_cast<void>(board_->answer(writes_its_number));
-    if (talker_ == Talker::drive) static_cast<void>(board_->answer(drives_the_brake));
+    static_cast<void>(board_->answer(talker_));
   }
   void set_talker(const std::string& what) {
-    constexpr std::array<std::string_view, 4> names{"off", "read", "write", "drive"};
-    const auto found = std::ranges::find(names, what);
-    if (found == names.end()) throw std::invalid_argument("\"" + what + "\": give read, write, drive or off");
-    talker_ = static_cast<Talker>(found - names.begin());
+    const auto found = std::ranges::find(talkers, what, &Talker::name);
+    if (found == talkers.end()) throw std::invalid_argument("\"" + what + "\": give read, write, drive or off");
+    talker_ = found->says;
   }
   [[nodiscard]] std::string registers() const { return board_->registers_text(); }
 
@@ -189,7 +191,7 @@ class EmulatedHm2 final : public EmulatedBoard {
   BoardTime time_;
   driver::FileDescriptor socket_{::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
   OutputFile changes_{};
-  Talker talker_{Talker::off};
+  std::span<const std::uint8_t> talker_{};
   std::int64_t talks_ns_{0};
 };
 

@@ -126,12 +126,8 @@ class BusSocket {
 };
 
 const char* name_of(emulator::CanNode::State state) {
-  switch (state) {
-    case emulator::CanNode::State::inactive: return "inactive";
-    case emulator::CanNode::State::active: return "active";
-    case emulator::CanNode::State::latched: return "latched";
-  }
-  return "unknown";
+  constexpr std::array<const char*, 3> names{"inactive", "active", "latched"};
+  return names[static_cast<std::size_t>(state)];
 }
 
 /// The CAN I/O node on its bus.

@@ -80,7 +80,7 @@ class EmulatedUsb final : public EmulatedBoard {
   void catch_up() override {
     if (!options_.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
     std::vector<std::uint8_t> replies;
-    device_.answer_late_ones(driver::monotonic_ns(), replies);
+    device_.give_answers(driver::monotonic_ns(), replies);
     send(replies);
   }
   std::string obey(std::string_view line) override { return obey_line(*this, line); }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -29,12 +30,8 @@ enum class Standing : std::uint8_t {
   unknown,     ///< these sources are silent or disagree: the driver never relies on it
 };
 [[nodiscard]] constexpr std::string_view name_of(Standing standing) noexcept {
-  switch (standing) {
-    case Standing::documented: return "documented";
-    case Standing::inferred: return "inferred";
-    case Standing::unknown: return "unknown";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 3> names{"documented", "inferred", "unknown"};
+  return names[static_cast<std::size_t>(standing)];
 }
 
 /// Ends the program with status 3. `what` names the board, the cause and the fix.

@@ -99,8 +99,6 @@ CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_st
   check_options("driver.can.", options);
 }
 
-CanDriver::~CanDriver() { static_cast<void>(deactivate()); }
-
 Frame CanDriver::in_format(Frame frame) const noexcept {
   frame.fd = fd_;
   return frame;

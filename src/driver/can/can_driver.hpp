@@ -141,7 +141,7 @@ class CanDriver final : public BoardDriver {
   /// @param open_link  called by `configure`; throws Unavailable
   /// @param lock_step  this driver advances the time of the node, which must be an emulator in lock-step
   CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step);
-  ~CanDriver() override;
+  ~CanDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
   [[nodiscard]] std::vector<std::string> notes() const override;

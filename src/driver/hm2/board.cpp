@@ -46,7 +46,6 @@ const std::array<Known, 4>& known_modules() {
 class Reader {
  public:
   Reader(Link& link, const std::string& place, std::uint32_t& number) : link_(link), place_(place), number_(number) {}
-
   Board read() {
     const auto id = words(at::cookie, 4);
     if (id[0] != cookie_value) refuse(formatted("its cookie is 0x%08x, not 0x%08x", id[0], cookie_value));

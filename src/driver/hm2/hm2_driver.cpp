@@ -98,8 +98,6 @@ Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock re
   check_options("driver.hm2.", options);
 }
 
-Hm2Driver::~Hm2Driver() { static_cast<void>(deactivate()); }
-
 void Hm2Driver::do_configure() {
   link_.reset();
   link_ = std::make_unique<RecordedLink>(open_link_());

@@ -49,7 +49,7 @@ class Hm2Driver final : public BoardDriver {
   /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
   /// @param lock_step   this driver advances the time of the board, which must be an emulator in lock-step
   Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock = nullptr, bool lock_step = false);
-  ~Hm2Driver() override;
+  ~Hm2Driver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "hm2"; }
   [[nodiscard]] std::vector<std::string> notes() const override;

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 #include "rig/formatted_text.hpp"
@@ -25,13 +26,9 @@ constexpr double longest_delay_s = 600.0;
 /// Longest delay of `delayed` and `slow`; the memory suffices for it at 10 kHz.
 constexpr double longest_holding_s = 0.5;
 
-template <std::size_t n>
-std::string listed(const std::array<std::string_view, n>& names) {
+std::string listed(std::span<const std::string_view> names) {
   std::string text;
-  for (const std::string_view name : names) {
-    if (!text.empty()) text += ' ';
-    text += name;
-  }
+  for (const std::string_view name : names) text.append(text.empty() ? "" : " ").append(name);
   return text;
 }
 
@@ -83,13 +80,11 @@ Parameter parameter_of(InjectionSignal signal, InjectionKind kind) {
   }
 }
 
-template <std::size_t n>
-std::size_t place_of(std::string_view text, std::string_view part, const std::array<std::string_view, n>& names,
+std::size_t place_of(std::string_view text, std::string_view part, std::span<const std::string_view> names,
                      const char* what) {
-  for (std::size_t i = 0; i < n; ++i) {
-    if (names[i] == part) return i;
-  }
-  refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
+  const auto found = std::ranges::find(names, part);
+  if (found == names.end()) refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
+  return static_cast<std::size_t>(found - names.begin());
 }
 
 std::optional<rig::Phase> phase_of(std::string_view text, std::string_view part) {

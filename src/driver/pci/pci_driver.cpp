@@ -58,8 +58,6 @@ PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock re
   check_options("driver.pci.", options);
 }
 
-PciDriver::~PciDriver() { static_cast<void>(deactivate()); }
-
 void PciDriver::do_configure() {
   card_ = {};  // releases the lock if this driver holds it
   card_ = open_card_();

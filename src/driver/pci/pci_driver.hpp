@@ -55,7 +55,7 @@ class PciDriver final : public BoardDriver {
   /// @param read_clock  the clock of `now_ns`. The time stamp of the counters is the middle of their reading, so that a
   ///                    delayed answer does not look like speed. Null in virtual time, where reading takes no time.
   PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock = nullptr);
-  ~PciDriver() override;
+  ~PciDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
   [[nodiscard]] std::vector<std::string> notes() const override;

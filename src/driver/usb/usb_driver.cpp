@@ -91,8 +91,6 @@ UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock 
   check_options("driver.usb.", options);
 }
 
-UsbDriver::~UsbDriver() { static_cast<void>(deactivate()); }
-
 void UsbDriver::do_configure() {
   board_ = {};  // releases the board if this driver has claimed it
   board_ = open_board_();

@@ -37,7 +37,7 @@ class UsbDriver final : public BoardDriver {
   /// @param read_clock the clock of `now_ns`. The time stamp of the counters is the middle between request and answer.
   ///                   Null in virtual time, where reading takes no time.
   UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock = nullptr);
-  ~UsbDriver() override;
+  ~UsbDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
