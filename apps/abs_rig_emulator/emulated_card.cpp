@@ -19,7 +19,6 @@
 
 #include "control.hpp"
 #include "driver/pci/wire.hpp"
-#include "emulator/register_faults.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::program {

@@ -12,7 +12,6 @@
 #include <stdexcept>
 
 #include "control.hpp"
-#include "emulator/hm2_link.hpp"
 
 namespace abs_hil::program {
 

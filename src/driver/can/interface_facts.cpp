@@ -1,6 +1,4 @@
 // Asks rtnetlink for the CAN interfaces and reads its answers.
-#include "driver/can/interface_facts.hpp"
-
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
@@ -15,7 +13,7 @@
 #include <functional>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/file_descriptor.hpp"
+#include "driver/can/bus.hpp"
 
 namespace abs_hil::driver::can {
 

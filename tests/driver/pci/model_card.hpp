@@ -10,7 +10,6 @@
 
 #include "driver/pci/pci_driver.hpp"
 #include "emulator/card_model.hpp"
-#include "emulator/register_faults.hpp"
 
 namespace abs_hil::test {
 
