@@ -94,17 +94,16 @@ class EmulatedBoard {
 void say(const std::string& text);
 
 /// One line of control: a name and its arguments.
-class ControlCommand {
- public:
-  explicit ControlCommand(std::string_view line);
+struct ControlCommand {
+  explicit ControlCommand(std::string_view text);
 
-  [[nodiscard]] bool empty() const noexcept { return words_.empty(); }
-  [[nodiscard]] const std::string& line() const noexcept { return line_; }
+  std::string line;
+  std::vector<std::string> words{};
+
   /// True if it has this name and number of arguments.
   [[nodiscard]] bool is(std::string_view name, std::size_t arguments) const;
-  [[nodiscard]] const std::string& name() const { return words_.at(0); }
   /// The nth argument, from 1.
-  [[nodiscard]] const std::string& text(std::size_t n) const { return words_.at(n); }
+  [[nodiscard]] const std::string& text(std::size_t n) const { return words.at(n); }
   /// The nth argument as a finite number. Throws std::invalid_argument if it is not one.
   [[nodiscard]] double number(std::size_t n) const;
   /// True if the nth argument is the first of these words, false if it is the second. Throws std::invalid_argument if
@@ -114,10 +113,6 @@ class ControlCommand {
 
   /// Throws std::invalid_argument with the line and the known commands.
   [[noreturn]] void refuse(const std::string& known) const;
-
- private:
-  std::string line_;
-  std::vector<std::string> words_{};
 };
 
 /// A command that a board obeys. Its usage begins with its name, then come its arguments.
@@ -132,7 +127,7 @@ struct ControlRow {
   [[nodiscard]] bool is(const ControlCommand& command) const {
     const auto arguments = static_cast<std::size_t>(std::count(usage.begin(), usage.end(), ' '));
     const std::string_view name = usage.substr(0, usage.find(' '));
-    return any_arguments ? command.name() == name : command.is(name, arguments);
+    return any_arguments ? command.words.at(0) == name : command.is(name, arguments);
   }
 };
 
@@ -148,7 +143,7 @@ template <class Board>
 template <class Board>
 [[nodiscard]] std::string obey_line(Board& board, std::string_view line) {
   const ControlCommand command(line);
-  if (command.empty()) return {};
+  if (command.words.empty()) return {};
   if (command.is("status", 0)) return board.status();
   for (const ControlRow<Board>& row : Board::rows()) {
     if (!row.is(command)) continue;

@@ -168,7 +168,7 @@ std::span<const ControlRow<EmulatedUsb>> EmulatedUsb::rows() {
   using Command = ControlCommand;
   static constexpr std::array<ControlRow<Usb>, 6> all{{
       {"fault KIND", "ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | garbage",
-       [](Usb& usb, const Command& c) { usb.device_.faults.set(c.line().substr(c.line().find("fault") + 5)); }, true},
+       [](Usb& usb, const Command& c) { usb.device_.faults.set(c.line.substr(c.line.find("fault") + 5)); }, true},
       {"unplug", "the cable; the outputs hold", [](Usb& usb, const Command&) { usb.unplug(); }},
       {"plug", "the cable is plugged in again",
        [](Usb& usb, const Command&) {

@@ -100,6 +100,12 @@ template <class Options>
   return std::abs(static_cast<double>(rig::counts_between(before, after))) <= most;
 }
 
+/// Counts travelled between two readings of a counter that wraps and is their lowest `bits` bits. Real-time safe.
+[[nodiscard]] inline std::int32_t travelled(std::uint32_t before, std::uint32_t after, unsigned bits) noexcept {
+  const unsigned unused = 32U - bits;
+  return std::bit_cast<std::int32_t>((after - before) << unused) >> unused;
+}
+
 /// The count after `moved` more; it wraps.
 [[nodiscard]] inline std::int32_t counts_after(std::int32_t counts, std::int32_t moved) noexcept {
   return std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(counts) + std::bit_cast<std::uint32_t>(moved));

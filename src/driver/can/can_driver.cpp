@@ -183,7 +183,8 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   commanded_ = {};
   command_sent_ = {};
   outputs_known_ = any_answer_ = false;
-  raw_counts_ = counts_ = {};
+  raw_counts_ = {};
+  counts_ = {};
   trip_flags_ = 0;
   answers_since_status_ = answers_since_outputs_ = 0;
   supply_V_ = temperature_C_ = rig::unknown;

@@ -221,8 +221,8 @@ class CanDriver final : public BoardDriver {
 
   // Last values from the node.
   bool any_answer_{false};
-  std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
-  std::array<std::int32_t, 2> counts_{};      ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
+  std::array<std::uint32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
+  std::array<std::int32_t, 2> counts_{};       ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
   std::int64_t node_time_us_{0};
   std::int64_t latched_ns_{0};
   double supply_V_{rig::unknown};

@@ -148,8 +148,7 @@ class Hm2Driver final : public BoardDriver {
   std::uint32_t missing_{0};      ///< of those, how many the board has not received; they may still come
   int answers_since_missing_{0};
   std::uint16_t clock_us_{0};
-  std::array<std::uint16_t, 2> raw_counts_{};
-  std::array<std::uint16_t, 2> stamps_{};  ///< of the last edges, by the board's clock for them
+  std::array<std::uint32_t, 2> raw_counts_{};  ///< as CycleAnswer has them
   rig::Measurement last_{};
   LossBucket bucket_{2, 1, 20};  ///< trips at the tenth loss in a row
   Counters counters_{};
