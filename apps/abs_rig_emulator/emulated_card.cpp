@@ -104,7 +104,35 @@ class EmulatedCard final : public EmulatedBoard {
     return fmt::format("{}, trip flags {:#x}", state_text(model_), model_.trip_flags());
   }
   [[nodiscard]] std::string place() const override { return "card " + folders_.front() + " in " + root_; }
-  [[nodiscard]] static std::span<const ControlRow<EmulatedCard>> rows();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedCard>> rows() {
+    using Card = EmulatedCard;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Card>, 13> all{{
+        {"fault OFFSET:KIND[=PARAMETER]", "one register: ok stuck wrong= slow= delayed= intermittent= off garbage",
+         [](Card& card, const Command& c) { card.faulty_.set(c.text(1)); }},
+        {"unplug", "the card's files disappear", [](Card& card, const Command&) { card.present_ = false; }},
+        {"plug", "they reappear", [](Card& card, const Command&) { card.present_ = true; }},
+        {"all-ones on|off", "the card leaves the bus, its files stay",
+         [](Card& card, const Command& c) { card.faulty_.answer_all_ones(c.on(1)); }},
+        {"deny on|off", "opening the registers is forbidden",
+         [](Card& card, const Command& c) { card.permission_denied_ = c.on(1); }},
+        estop_row<Card>,
+        supply_row<Card>,
+        temperature_row<Card>,
+        overspeed_row<Card>,
+        turn_row<Card>,
+        {"record FILE|off", "register accesses: R or W, offset, value",
+         [](Card& card, const Command& c) { card.traffic_.begin(c.text(1)); }},
+        {"changes FILE|off", "each change of a PWM's width: when, ns as in \"widths\", drive, brake",
+         [](Card& card, const Command& c) { card.changes_.begin(c.text(1)); }},
+        {.usage = "widths",
+         .meaning =
+             "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in "
+             "lock-step of the card's time",
+         .answer = &Card::widths},
+    }};
+    return all;
+  }
   [[nodiscard]] emulator::CardModel& model() noexcept { return model_; }
 
   // For FUSE.
@@ -206,35 +234,6 @@ class EmulatedCard final : public EmulatedBoard {
   fuse* tree_{nullptr};
   fuse_buf buffer_{};
 };
-
-std::span<const ControlRow<EmulatedCard>> EmulatedCard::rows() {
-  using Card = EmulatedCard;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Card>, 13> all{{
-      {"fault OFFSET:KIND[=PARAMETER]", "one register: ok stuck wrong= slow= delayed= intermittent= off garbage",
-       [](Card& card, const Command& c) { card.faulty_.set(c.text(1)); }},
-      {"unplug", "the card's files disappear", [](Card& card, const Command&) { card.present_ = false; }},
-      {"plug", "they reappear", [](Card& card, const Command&) { card.present_ = true; }},
-      {"all-ones on|off", "the card leaves the bus, its files stay",
-       [](Card& card, const Command& c) { card.faulty_.answer_all_ones(c.on(1)); }},
-      {"deny on|off", "opening the registers is forbidden",
-       [](Card& card, const Command& c) { card.permission_denied_ = c.on(1); }},
-      estop_row<Card>,
-      supply_row<Card>,
-      temperature_row<Card>,
-      overspeed_row<Card>,
-      turn_row<Card>,
-      {"record FILE|off", "register accesses: R or W, offset, value",
-       [](Card& card, const Command& c) { card.traffic_.begin(c.text(1)); }},
-      {"changes FILE|off", "each change of a PWM's width: when, ns as in \"widths\", drive, brake",
-       [](Card& card, const Command& c) { card.changes_.begin(c.text(1)); }},
-      {.usage = "widths",
-       .meaning = "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in "
-                  "lock-step of the card's time",
-       .answer = &Card::widths},
-  }};
-  return all;
-}
 
 EmulatedCard& card() { return *static_cast<EmulatedCard*>(fuse_get_context()->private_data); }
 

@@ -154,7 +154,32 @@ class EmulatedHm2 final : public EmulatedBoard {
     return fmt::format("{} at {}:{}", options_.name, address_text_.substr(0, address_text_.find(':')),
                        ntohs(address_.sin_port));
   }
-  [[nodiscard]] static std::span<const ControlRow<EmulatedHm2>> rows();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedHm2>> rows() {
+    using Hm2 = EmulatedHm2;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Hm2>, 10> all{{
+        {"fault NAME[=NUMBER]",
+         "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage: of the "
+         "datagrams",
+         [](Hm2& hm2, const Command& c) { hm2.link_.set(c.text(1)); }},
+        {"link up|down", "the Ethernet cable; the rig goes on",
+         [](Hm2& hm2, const Command& c) { hm2.link_.plug(c.first_of(1, "up", "down")); }},
+        {"bite", "the watchdog bites now", [](Hm2& hm2, const Command&) { hm2.board_->bite(); }},
+        {"power-cycle", "the board is switched off and on; the wheels turn on",
+         [](Hm2& hm2, const Command&) { hm2.board_->power_cycle(); }},
+        {"talker read|write|drive|off", "another program sends every 10 ms: reads, writes its number, drives the brake",
+         [](Hm2& hm2, const Command& c) { hm2.set_talker(c.text(1)); }},
+        {"quadrature-error upper|lower", "a counter sees both lines change together",
+         [](Hm2& hm2, const Command& c) { hm2.board_->make_quadrature_error(c.first_of(1, "upper", "lower")); }},
+        estop_row<Hm2>,
+        turn_row<Hm2>,
+        {"changes FILE|off",
+         "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
+         [](Hm2& hm2, const Command& c) { hm2.changes_.begin(c.text(1)); }},
+        {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
+    }};
+    return all;
+  }
   [[nodiscard]] emulator::UdpBoard& model() noexcept { return *board_; }
 
  private:
@@ -193,33 +218,6 @@ class EmulatedHm2 final : public EmulatedBoard {
   std::span<const std::uint8_t> talker_{};
   std::int64_t talks_ns_{0};
 };
-
-std::span<const ControlRow<EmulatedHm2>> EmulatedHm2::rows() {
-  using Hm2 = EmulatedHm2;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Hm2>, 10> all{{
-      {"fault NAME[=NUMBER]",
-       "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage: of the "
-       "datagrams",
-       [](Hm2& hm2, const Command& c) { hm2.link_.set(c.text(1)); }},
-      {"link up|down", "the Ethernet cable; the rig goes on",
-       [](Hm2& hm2, const Command& c) { hm2.link_.plug(c.first_of(1, "up", "down")); }},
-      {"bite", "the watchdog bites now", [](Hm2& hm2, const Command&) { hm2.board_->bite(); }},
-      {"power-cycle", "the board is switched off and on; the wheels turn on",
-       [](Hm2& hm2, const Command&) { hm2.board_->power_cycle(); }},
-      {"talker read|write|drive|off", "another program sends every 10 ms: reads, writes its number, drives the brake",
-       [](Hm2& hm2, const Command& c) { hm2.set_talker(c.text(1)); }},
-      {"quadrature-error upper|lower", "a counter sees both lines change together",
-       [](Hm2& hm2, const Command& c) { hm2.board_->make_quadrature_error(c.first_of(1, "upper", "lower")); }},
-      estop_row<Hm2>,
-      turn_row<Hm2>,
-      {"changes FILE|off",
-       "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
-       [](Hm2& hm2, const Command& c) { hm2.changes_.begin(c.text(1)); }},
-      {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
-  }};
-  return all;
-}
 
 }  // namespace
 

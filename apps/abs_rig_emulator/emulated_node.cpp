@@ -175,7 +175,25 @@ class EmulatedNode final : public EmulatedBoard {
                        node_.trip_flags(), name_of(node_.state()), node_.rejected());
   }
   [[nodiscard]] std::string place() const override { return "CAN node on " + interface_; }
-  [[nodiscard]] static std::span<const ControlRow<EmulatedNode>> rows();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedNode>> rows() {
+    using Node = EmulatedNode;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Node>, 7> all{{
+        {"fault NAME[=NUMBER]",
+         "ok silent deaf no-deactivate drop= no-status no-outputs stale= ahead= stuck duplicate swapped wrong-size= "
+         "corrupt nonsense babble=",
+         [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
+        {"restart", "the node is switched off and on: inactive, its clock at 0",
+         [](Node& node, const Command&) { node.power_on(); }},
+        estop_row<Node>,
+        supply_row<Node>,
+        temperature_row<Node>,
+        overspeed_row<Node>,
+        {"brake-error DUTY", "the brake's duty is off by this from what is commanded",
+         [](Node& node, const Command& c) { node.node_.break_brake_output(c.number(1)); }},
+    }};
+    return all;
+  }
   [[nodiscard]] emulator::CanNode& model() noexcept { return node_; }
 
  private:
@@ -191,26 +209,6 @@ class EmulatedNode final : public EmulatedBoard {
   emulator::NodeFaults faults_;
   BoardTime time_;
 };
-
-std::span<const ControlRow<EmulatedNode>> EmulatedNode::rows() {
-  using Node = EmulatedNode;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Node>, 7> all{{
-      {"fault NAME[=NUMBER]",
-       "ok silent deaf no-deactivate drop= no-status no-outputs stale= ahead= stuck duplicate swapped wrong-size= "
-       "corrupt nonsense babble=",
-       [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
-      {"restart", "the node is switched off and on: inactive, its clock at 0",
-       [](Node& node, const Command&) { node.power_on(); }},
-      estop_row<Node>,
-      supply_row<Node>,
-      temperature_row<Node>,
-      overspeed_row<Node>,
-      {"brake-error DUTY", "the brake's duty is off by this from what is commanded",
-       [](Node& node, const Command& c) { node.node_.break_brake_output(c.number(1)); }},
-  }};
-  return all;
-}
 
 }  // namespace
 

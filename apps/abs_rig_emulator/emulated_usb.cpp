@@ -92,7 +92,24 @@ class EmulatedUsb final : public EmulatedBoard {
     return fmt::format("board {:04x}:{:04x} \"{}\" at {}", options_.identity.vendor_id, options_.identity.product_id,
                        options_.identity.manufacturer, options_.controller);
   }
-  [[nodiscard]] static std::span<const ControlRow<EmulatedUsb>> rows();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedUsb>> rows() {
+    using Usb = EmulatedUsb;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Usb>, 6> all{{
+        {"fault KIND", "ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | garbage",
+         [](Usb& usb, const Command& c) { usb.device_.faults.set(c.line.substr(c.line.find("fault") + 5)); }, true},
+        {"unplug", "the cable; the outputs hold", [](Usb& usb, const Command&) { usb.unplug(); }},
+        {"plug", "the cable is plugged in again",
+         [](Usb& usb, const Command&) {
+           if (usb.host_.get() < 0) usb.plug_in();
+         }},
+        {"break-brake on|off", "the brake's PWM ignores writes",
+         [](Usb& usb, const Command& c) { usb.board_.break_brake(c.on(1)); }},
+        estop_row<Usb>,
+        turn_row<Usb>,
+    }};
+    return all;
+  }
   [[nodiscard]] emulator::UsbBoardModel& model() noexcept { return board_; }
 
  private:
@@ -162,25 +179,6 @@ class EmulatedUsb final : public EmulatedBoard {
   std::int64_t brake_since_ns_{-1};
   BoardTime time_;
 };
-
-std::span<const ControlRow<EmulatedUsb>> EmulatedUsb::rows() {
-  using Usb = EmulatedUsb;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Usb>, 6> all{{
-      {"fault KIND", "ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | garbage",
-       [](Usb& usb, const Command& c) { usb.device_.faults.set(c.line.substr(c.line.find("fault") + 5)); }, true},
-      {"unplug", "the cable; the outputs hold", [](Usb& usb, const Command&) { usb.unplug(); }},
-      {"plug", "the cable is plugged in again",
-       [](Usb& usb, const Command&) {
-         if (usb.host_.get() < 0) usb.plug_in();
-       }},
-      {"break-brake on|off", "the brake's PWM ignores writes",
-       [](Usb& usb, const Command& c) { usb.board_.break_brake(c.on(1)); }},
-      estop_row<Usb>,
-      turn_row<Usb>,
-  }};
-  return all;
-}
 
 }  // namespace
 
