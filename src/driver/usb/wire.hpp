@@ -160,9 +160,8 @@ struct UsbDevice {
 [[nodiscard]] std::vector<UsbDevice> find_boards(const UsbOptions& options);
 
 /// The board that the options select. Throws Unavailable with a fix if there is none, or more than one.
-/// @param lock_step advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
-/// emulator
-///                  in lock-step is refused
+/// @param lock_step  advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
+///                   emulator in lock-step is refused
 /// @param emulated  the board must be an emulator; any other board is refused
 [[nodiscard]] UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated);
 
