@@ -19,9 +19,9 @@ constexpr std::array<std::string_view, injection_signal_count> signals{
     "trip",          "read",          "motor_pwm", "brake_pwm", "enable", "write"};
 constexpr std::array<std::string_view, injection_kind_count> kinds{"ok",    "off",  "stuck",   "garbage",
                                                                    "wrong", "slow", "delayed", "intermittent"};
-constexpr std::array<rig::Phase, 6> phases{rig::Phase::idle,  rig::Phase::accelerate, rig::Phase::coast,
-                                           rig::Phase::brake, rig::Phase::hold,       rig::Phase::stopped};
 constexpr std::string_view any_phase = "any";
+constexpr std::array<std::string_view, 7> phases{"idle", "accelerate", "coast", "brake", "hold", "stopped", any_phase};
+static_assert(phases[static_cast<std::size_t>(rig::Phase::stopped)] == rig::name_of(rig::Phase::stopped));
 constexpr double longest_delay_s = 600.0;
 /// Longest delay of `delayed` and `slow`; the memory suffices for it at 10 kHz.
 constexpr double longest_holding_s = 0.5;
@@ -87,16 +87,6 @@ std::size_t place_of(std::string_view text, std::string_view part, std::span<con
   return static_cast<std::size_t>(found - names.begin());
 }
 
-std::optional<rig::Phase> phase_of(std::string_view text, std::string_view part) {
-  if (part == any_phase) return std::nullopt;
-  std::string known;
-  for (const rig::Phase phase : phases) {
-    if (rig::name_of(phase) == part) return phase;
-    known += std::string(rig::name_of(phase)) + ' ';
-  }
-  refuse(text, part, "not a phase; known: " + known + std::string(any_phase));
-}
-
 /// Cuts off and returns what follows the last `mark`; nothing if there is none.
 std::optional<std::string_view> cut(std::string_view& rest, char mark) {
   const std::size_t at = rest.rfind(mark);
@@ -144,7 +134,8 @@ Injection parse_injection(std::string_view text) {
   if (!kind) refuse(text, rest, "no \":KIND\"; known: " + listed(kinds));
   const auto signal = cut(rest, '@');
   if (!signal) refuse(text, rest, "no \"PHASE@\" before the signal");
-  injection.phase = phase_of(text, rest);
+  const std::size_t phase = place_of(text, rest, phases, "phase");
+  if (phases[phase] != any_phase) injection.phase = static_cast<rig::Phase>(phase);
   injection.signal = static_cast<InjectionSignal>(place_of(text, *signal, signals, "signal"));
   injection.kind = static_cast<InjectionKind>(place_of(text, *kind, kinds, "kind"));
   read_parameter(text, parameter, injection);
