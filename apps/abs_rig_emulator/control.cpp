@@ -19,19 +19,19 @@ void say(const std::string& text) {
   std::fflush(stdout);
 }
 
-ControlCommand::ControlCommand(std::string_view line) : line_(line) {
+ControlCommand::ControlCommand(std::string_view text) : line(text) {
   std::string word;
-  for (const char c : line_ + ' ') {
+  for (const char c : line + ' ') {
     if (c != ' ' && c != '\t' && c != '\r') {
       word += c;
     } else if (!word.empty()) {
-      words_.push_back(std::exchange(word, {}));
+      words.push_back(std::exchange(word, {}));
     }
   }
 }
 
 bool ControlCommand::is(std::string_view name, std::size_t arguments) const {
-  return words_.size() == arguments + 1 && words_[0] == name;
+  return words.size() == arguments + 1 && words[0] == name;
 }
 
 double ControlCommand::number(std::size_t n) const {
@@ -51,7 +51,7 @@ bool ControlCommand::first_of(std::size_t n, std::string_view first, std::string
 }
 
 void ControlCommand::refuse(const std::string& known) const {
-  throw std::invalid_argument("unknown command \"" + line_ + "\"; known are\n" + known);
+  throw std::invalid_argument("unknown command \"" + line + "\"; known are\n" + known);
 }
 
 void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* changes) {

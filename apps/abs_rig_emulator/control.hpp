@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <fstream>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -17,25 +19,91 @@
 
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
-#include "emulator/rig_behind.hpp"
+#include "emulator/card_model.hpp"
+#include "emulator/udp_board.hpp"
+#include "emulator/usbip_device.hpp"
 
 namespace abs_hil::program {
+
+/// What the command line says of the board.
+struct EmulatorOptions {
+  emulator::CardOptions card{};     ///< its plant, start speed and limits are those of every board
+  emulator::UsbBoardOptions usb{};  ///< its enable line is the 7I92T's, too
+  emulator::UsbIdentity identity{};
+  emulator::Hm2Options hm2{};               ///< of the 7I92T or the node; an empty name means the usual one
+  std::uint16_t watchdog_ms{20};            ///< of the CAN node
+  std::vector<std::string> when_braking{};  ///< commands of the USB board, obeyed once the brake has acted for 0.3 s
+  std::uint64_t seed{1};
+  bool lock_step{false};
+  std::string truth_file{};    ///< CSV of true values that no register or frame shows; empty: none
+  std::string traffic_file{};  ///< log of every register access to the card; empty: none
+  // Where the board is.
+  std::string pci_root{};
+  std::string can_interface{};
+  bool use_usb{false};
+  std::string controller{"/sys/devices/platform/vhci_hcd.0"};  ///< the kernel's virtual host controller
+  std::string hm2_address{};                                   ///< ADDRESS or ADDRESS:PORT, of a 7I92T
+  std::string node_address{};                                  ///< the same of the node of docs/node.md
+  std::string mac{};                                           ///< "00:60:1b:16:ab:50"; empty: the default
+  // What the card's folder shows.
+  std::vector<std::string> bdfs{"0000:03:00.0"};
+  std::string vendor{"0x10b5"};
+  std::string device{"0x2497"};
+  std::uint32_t bar_bytes{256};
+  std::string bar_kind{"io"};
+};
+
+/// A board with time, faults, logs and control commands, as the main loop sees it.
+class EmulatedBoard {
+ public:
+  EmulatedBoard() = default;
+  EmulatedBoard(const EmulatedBoard&) = delete;
+  EmulatedBoard& operator=(const EmulatedBoard&) = delete;
+  virtual ~EmulatedBoard() = default;
+
+  /// Descriptor for poll().
+  [[nodiscard]] virtual int descriptor() const = 0;
+  /// Answers what has come from the host. False: the host has gone for good.
+  virtual bool serve() = 0;
+  /// Advances the rig to the current time, in lock-step only the host does, and sends the answers that are due.
+  virtual void catch_up() = 0;
+  /// Time in ns until the next delayed answer; none: there is no such answer.
+  [[nodiscard]] virtual std::optional<std::int64_t> next_due_ns() const { return std::nullopt; }
+  /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
+  virtual std::string obey(std::string_view line) = 0;
+  /// Current duties at the power stage and other values, as one line.
+  [[nodiscard]] virtual std::string status() const = 0;
+  [[nodiscard]] virtual std::string place() const = 0;
+};
+
+/// Each throws std::invalid_argument, or std::runtime_error if what it needs of this computer is missing: a FUSE mount,
+/// a bus or socket, a virtual host controller, an address.
+[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_card(const EmulatorOptions& options);
+[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_can_node(const EmulatorOptions& options);
+[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_usb(const EmulatorOptions& options);
+/// The 7I92T, or the node if `node_address` is not empty.
+[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_hm2(const EmulatorOptions& options);
+
+/// Their control commands, one per line, for the help.
+[[nodiscard]] std::string commands_of_card();
+[[nodiscard]] std::string commands_of_can_node();
+[[nodiscard]] std::string commands_of_usb();
+[[nodiscard]] std::string commands_of_hm2();
 
 /// Prints a line and flushes it.
 void say(const std::string& text);
 
 /// One line of control: a name and its arguments.
-class ControlCommand {
- public:
-  explicit ControlCommand(std::string_view line);
+struct ControlCommand {
+  explicit ControlCommand(std::string_view text);
 
-  [[nodiscard]] bool empty() const noexcept { return words_.empty(); }
-  [[nodiscard]] const std::string& line() const noexcept { return line_; }
+  std::string line;
+  std::vector<std::string> words{};
+
   /// True if it has this name and number of arguments.
   [[nodiscard]] bool is(std::string_view name, std::size_t arguments) const;
-  [[nodiscard]] const std::string& name() const { return words_.at(0); }
   /// The nth argument, from 1.
-  [[nodiscard]] const std::string& text(std::size_t n) const { return words_.at(n); }
+  [[nodiscard]] const std::string& text(std::size_t n) const { return words.at(n); }
   /// The nth argument as a finite number. Throws std::invalid_argument if it is not one.
   [[nodiscard]] double number(std::size_t n) const;
   /// True if the nth argument is the first of these words, false if it is the second. Throws std::invalid_argument if
@@ -45,10 +113,6 @@ class ControlCommand {
 
   /// Throws std::invalid_argument with the line and the known commands.
   [[noreturn]] void refuse(const std::string& known) const;
-
- private:
-  std::string line_;
-  std::vector<std::string> words_{};
 };
 
 /// A command that a board obeys. Its usage begins with its name, then come its arguments.
@@ -63,7 +127,7 @@ struct ControlRow {
   [[nodiscard]] bool is(const ControlCommand& command) const {
     const auto arguments = static_cast<std::size_t>(std::count(usage.begin(), usage.end(), ' '));
     const std::string_view name = usage.substr(0, usage.find(' '));
-    return any_arguments ? command.name() == name : command.is(name, arguments);
+    return any_arguments ? command.words.at(0) == name : command.is(name, arguments);
   }
 };
 
@@ -79,7 +143,7 @@ template <class Board>
 template <class Board>
 [[nodiscard]] std::string obey_line(Board& board, std::string_view line) {
   const ControlCommand command(line);
-  if (command.empty()) return {};
+  if (command.words.empty()) return {};
   if (command.is("status", 0)) return board.status();
   for (const ControlRow<Board>& row : Board::rows()) {
     if (!row.is(command)) continue;

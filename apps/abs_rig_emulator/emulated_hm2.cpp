@@ -1,6 +1,4 @@
 // The emulated 7I92T, or the node, behind a UDP socket with a cable that can be pulled.
-#include "emulated_hm2.hpp"
-
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
@@ -13,8 +11,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "driver/monotonic_time.hpp"
-#include "emulator/node_board.hpp"
+#include "control.hpp"
 
 namespace abs_hil::program {
 
@@ -30,178 +27,204 @@ constexpr std::array<std::uint8_t, 28> drives_the_brake{
     0x81, 0xC2, 0x00, 0x0E, 0x00, 0x00, 0x00, 0x5A,                          // reload the watchdog
     0x82, 0xD1, 0x14, 0x00, 0xEF, 0xBE, 0xAD, 0xDE};                         // its write number
 
-emulator::Hm2Options with_address(const Hm2EmulatorOptions& options, std::uint32_t& ip, std::uint16_t& port) {
-  const std::string& text = options.address;
+struct Talker {
+  std::string_view name;
+  std::span<const std::uint8_t> says;
+};
+constexpr std::array<Talker, 4> talkers{
+    {{"off", {}}, {"read", reads_the_clock}, {"write", writes_its_number}, {"drive", drives_the_brake}}};
+
+/// "ADDRESS" or "ADDRESS:PORT".
+sockaddr_in address_in(const std::string& text) {
   const auto refuse = [&text](const std::string& why) {
     throw std::invalid_argument("address \"" + text + "\": " + why + "; give ADDRESS or ADDRESS:PORT, for example " +
                                 "127.0.0.1:27181");
   };
   const std::size_t colon = text.find(':');
-  in_addr address{};
-  if (::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address) != 1) refuse("not an IPv4 address");
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  if (::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) != 1) refuse("not an IPv4 address");
+  std::uint16_t port = emulator::hm2_port;
   if (colon != std::string::npos) {
     const char* const end = text.data() + text.size();
     const auto [at, error] = std::from_chars(text.data() + colon + 1, end, port);
     if (error != std::errc() || at != end || port == 0) refuse("the port is not 1 to 65535");
   }
-  ip = address.s_addr;
-  emulator::Hm2Options board = options.board;
-  std::memcpy(board.address.data(), &ip, board.address.size());
-  if (!options.mac.empty()) {
-    std::array<unsigned, 6> m{};
-    int used = 0;
-    if (std::sscanf(options.mac.c_str(), "%2x:%2x:%2x:%2x:%2x:%2x%n", &m[0], &m[1], &m[2], &m[3], &m[4], &m[5],
-                    &used) != 6 ||
-        used != static_cast<int>(options.mac.size())) {
-      throw std::invalid_argument("--mac " + options.mac + ": give six bytes, for example 00:60:1b:16:ab:50");
-    }
-    for (std::size_t i = 0; i < m.size(); ++i) board.mac[i] = static_cast<std::uint8_t>(m[i]);
+  address.sin_port = htons(port);
+  return address;
+}
+
+std::array<std::uint8_t, 6> mac_in(const std::string& text) {
+  std::array<unsigned, 6> m{};
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%2x:%2x:%2x:%2x:%2x:%2x%n", &m[0], &m[1], &m[2], &m[3], &m[4], &m[5], &used) != 6 ||
+      used != static_cast<int>(text.size())) {
+    throw std::invalid_argument("--mac " + text + ": give six bytes, for example 00:60:1b:16:ab:50");
+  }
+  std::array<std::uint8_t, 6> mac{};
+  std::ranges::transform(m, mac.begin(), [](unsigned byte) { return static_cast<std::uint8_t>(byte); });
+  return mac;
+}
+
+bool is_node(const EmulatorOptions& options) { return !options.node_address.empty(); }
+
+emulator::Hm2Options board_options(const EmulatorOptions& options, const sockaddr_in& address) {
+  emulator::Hm2Options board = options.hm2;
+  board.plant = options.card.plant;
+  board.start_speed_rad_s = options.card.start_speed_rad_s;
+  board.enable_pin = options.usb.enable_line;
+  board.lock_step = options.lock_step;
+  if (board.name.empty()) board.name = is_node(options) ? "abs-node" : "7I92T";
+  std::memcpy(board.address.data(), &address.sin_addr, board.address.size());
+  if (!options.mac.empty()) board.mac = mac_in(options.mac);
+  const int most = is_node(options) ? 0 : 33;
+  if (board.enable_pin < -1 || board.enable_pin > most) {
+    throw std::invalid_argument(fmt::format("--enable-line {}: {}; -1: none", board.enable_pin,
+                                            is_node(options) ? "the node has output 0 alone" : "give an I/O, 0 to 33"));
+  }
+  if (is_node(options) && (!board.lie.empty() || board.active_high_stage)) {
+    throw std::invalid_argument("--wrong-board and --active-high are of the 7I92T, not of the node; give --hm2");
   }
   return board;
 }
 
-std::unique_ptr<emulator::UdpBoard> make_board(const Hm2EmulatorOptions& options, std::uint32_t& ip,
-                                               std::uint16_t& port) {
-  const emulator::Hm2Options board = with_address(options, ip, port);
-  const int most = options.is_node ? 0 : 33;
-  if (board.enable_pin < -1 || board.enable_pin > most) {
-    throw std::invalid_argument(fmt::format("--enable-line {}: {}; -1: none", board.enable_pin,
-                                            options.is_node ? "the node has output 0 alone" : "give an I/O, 0 to 33"));
+/// The 7I92T or the node behind a UDP socket: time, cable, logs and the control commands.
+class EmulatedHm2 final : public EmulatedBoard {
+ public:
+  explicit EmulatedHm2(const EmulatorOptions& options)
+      : is_node_(is_node(options)),
+        address_text_(is_node_ ? options.node_address : options.hm2_address),
+        address_(address_in(address_text_)),
+        options_(board_options(options, address_)),
+        board_(is_node_ ? emulator::node_board(options_) : emulator::hm2_board(options_)),
+        link_(options.seed),
+        time_(options_.lock_step, options.truth_file) {
+    if (socket_.get() < 0 ||
+        ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address_), sizeof address_) != 0) {
+      throw std::runtime_error(address_text_ + ": " + std::strerror(errno) +
+                               "; give an address of this computer and a port that no program uses");
+    }
   }
-  if (options.is_node && (!board.lie.empty() || board.active_high_stage)) {
-    throw std::invalid_argument("--wrong-board and --active-high are of the 7I92T, not of the node; give --hm2");
+
+  [[nodiscard]] int descriptor() const override { return socket_.get(); }
+  bool serve() override {
+    std::array<std::uint8_t, 2048> buffer{};
+    for (;;) {
+      sockaddr_in from{};
+      socklen_t length = sizeof from;
+      const ssize_t got =
+          ::recvfrom(socket_.get(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
+      if (got < 0) break;
+      if (!link_.request_arrives()) continue;
+      time_.catch_up(*board_);
+      emulator::Hm2Datagram answer{board_->answer(std::span(buffer).first(static_cast<std::size_t>(got))),
+                                   std::uint64_t{from.sin_addr.s_addr} << 16U | from.sin_port};
+      if (!answer.bytes.empty()) link_.send(std::move(answer), driver::monotonic_ns());
+      send_due();
+    }
+    log_events();
+    return true;
   }
-  if (options.is_node) return std::make_unique<emulator::NodeBoard>(board);
-  return std::make_unique<emulator::Hm2Board>(board);
-}
+  void catch_up() override {
+    time_.catch_up(*board_);
+    talk();
+    send_due();
+    log_events();
+  }
+  [[nodiscard]] std::optional<std::int64_t> next_due_ns() const override {
+    const std::optional<std::int64_t> due = link_.next_due_ns();
+    return due ? std::optional(*due - driver::monotonic_ns()) : std::nullopt;
+  }
+  std::string obey(std::string_view line) override {
+    catch_up();
+    std::string answer = obey_line(*this, line);
+    log_events();
+    return answer;
+  }
+  [[nodiscard]] std::string status() const override {
+    constexpr int microseconds = 6;
+    return fmt::format("{}, {}, pins {}, cable {}, writes {}", state_text(*board_, microseconds),
+                       board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
+                       board_->drives_pins() ? "driven"
+                       : is_node_            ? "pulled low"
+                                             : "pulled high",
+                       link_.plugged() ? "in" : "out", board_->writes());
+  }
+  [[nodiscard]] std::string place() const override {
+    return fmt::format("{} at {}:{}", options_.name, address_text_.substr(0, address_text_.find(':')),
+                       ntohs(address_.sin_port));
+  }
+  [[nodiscard]] static std::span<const ControlRow<EmulatedHm2>> rows() {
+    using Hm2 = EmulatedHm2;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Hm2>, 10> all{{
+        {"fault NAME[=NUMBER]",
+         "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage: of the "
+         "datagrams",
+         [](Hm2& hm2, const Command& c) { hm2.link_.set(c.text(1)); }},
+        {"link up|down", "the Ethernet cable; the rig goes on",
+         [](Hm2& hm2, const Command& c) { hm2.link_.plug(c.first_of(1, "up", "down")); }},
+        {"bite", "the watchdog bites now", [](Hm2& hm2, const Command&) { hm2.board_->bite(); }},
+        {"power-cycle", "the board is switched off and on; the wheels turn on",
+         [](Hm2& hm2, const Command&) { hm2.board_->power_cycle(); }},
+        {"talker read|write|drive|off", "another program sends every 10 ms: reads, writes its number, drives the brake",
+         [](Hm2& hm2, const Command& c) { hm2.set_talker(c.text(1)); }},
+        {"quadrature-error upper|lower", "a counter sees both lines change together",
+         [](Hm2& hm2, const Command& c) { hm2.board_->make_quadrature_error(c.first_of(1, "upper", "lower")); }},
+        estop_row<Hm2>,
+        turn_row<Hm2>,
+        {"changes FILE|off",
+         "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
+         [](Hm2& hm2, const Command& c) { hm2.changes_.begin(c.text(1)); }},
+        {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
+    }};
+    return all;
+  }
+  [[nodiscard]] emulator::UdpBoard& model() noexcept { return *board_; }
+
+ private:
+  void send_due() {
+    for (const emulator::Hm2Datagram& answer : link_.take_due(driver::monotonic_ns())) {
+      sockaddr_in to{};
+      to.sin_family = AF_INET;
+      to.sin_port = static_cast<std::uint16_t>(answer.peer);
+      to.sin_addr.s_addr = static_cast<std::uint32_t>(answer.peer >> 16U);
+      static_cast<void>(::sendto(socket_.get(), answer.bytes.data(), answer.bytes.size(), MSG_NOSIGNAL,
+                                 reinterpret_cast<const sockaddr*>(&to), sizeof to));
+    }
+  }
+  void log_events() { take_log(board_->log(), time_.start_ns(), changes_.is_open() ? &changes_ : nullptr); }
+  void talk() {
+    if (talker_.empty() || board_->time_ns() < talks_ns_) return;
+    talks_ns_ = board_->time_ns() + talks_every_ns;
+    static_cast<void>(board_->answer(talker_));
+  }
+  void set_talker(const std::string& what) {
+    const auto found = std::ranges::find(talkers, what, &Talker::name);
+    if (found == talkers.end()) throw std::invalid_argument("\"" + what + "\": give read, write, drive or off");
+    talker_ = found->says;
+  }
+  [[nodiscard]] std::string registers() const { return board_->registers_text(); }
+
+  bool is_node_;
+  std::string address_text_;
+  sockaddr_in address_;
+  emulator::Hm2Options options_;
+  std::unique_ptr<emulator::UdpBoard> board_;
+  emulator::Hm2Link link_;
+  BoardTime time_;
+  driver::FileDescriptor socket_{::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
+  OutputFile changes_{};
+  std::span<const std::uint8_t> talker_{};
+  std::int64_t talks_ns_{0};
+};
 
 }  // namespace
 
-EmulatedHm2::EmulatedHm2(Hm2EmulatorOptions options)
-    : options_(std::move(options)),
-      board_(make_board(options_, ip_, port_)),
-      link_(options_.seed),
-      time_(options_.board.lock_step, options_.truth_file) {
-  bind();
-}
+std::string commands_of_hm2() { return help_of(EmulatedHm2::rows()); }
 
-void EmulatedHm2::bind() {
-  socket_ = driver::FileDescriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port_);
-  address.sin_addr.s_addr = ip_;
-  if (socket_.get() < 0 || ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw std::runtime_error(options_.address + ": " + std::strerror(errno) +
-                             "; give an address of this computer and a port that no program uses");
-  }
-}
-
-bool EmulatedHm2::serve() {
-  std::array<std::uint8_t, 2048> buffer{};
-  for (;;) {
-    sockaddr_in from{};
-    socklen_t length = sizeof from;
-    const ssize_t got =
-        ::recvfrom(socket_.get(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
-    if (got < 0) break;
-    if (!link_.request_arrives()) continue;
-    time_.catch_up(*board_);
-    emulator::Hm2Datagram answer{board_->answer(std::span(buffer).first(static_cast<std::size_t>(got))),
-                                 std::uint64_t{from.sin_addr.s_addr} << 16U | from.sin_port};
-    if (!answer.bytes.empty()) link_.send(std::move(answer), driver::monotonic_ns());
-    send_due();
-  }
-  log_events();
-  return true;
-}
-
-void EmulatedHm2::send_due() {
-  for (const emulator::Hm2Datagram& answer : link_.take_due(driver::monotonic_ns())) {
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = static_cast<std::uint16_t>(answer.peer);
-    to.sin_addr.s_addr = static_cast<std::uint32_t>(answer.peer >> 16U);
-    static_cast<void>(::sendto(socket_.get(), answer.bytes.data(), answer.bytes.size(), MSG_NOSIGNAL,
-                               reinterpret_cast<const sockaddr*>(&to), sizeof to));
-  }
-}
-
-std::optional<std::int64_t> EmulatedHm2::next_due_ns() const {
-  const std::optional<std::int64_t> due = link_.next_due_ns();
-  return due ? std::optional(*due - driver::monotonic_ns()) : std::nullopt;
-}
-
-void EmulatedHm2::talk() {
-  if (talker_ == Talker::off || board_->time_ns() < talks_ns_) return;
-  talks_ns_ = board_->time_ns() + talks_every_ns;
-  if (talker_ == Talker::read) static_cast<void>(board_->answer(reads_the_clock));
-  if (talker_ == Talker::write) static_cast<void>(board_->answer(writes_its_number));
-  if (talker_ == Talker::drive) static_cast<void>(board_->answer(drives_the_brake));
-}
-
-void EmulatedHm2::catch_up() {
-  time_.catch_up(*board_);
-  talk();
-  send_due();
-  log_events();
-}
-
-void EmulatedHm2::log_events() { take_log(board_->log(), time_.start_ns(), changes_.is_open() ? &changes_ : nullptr); }
-
-std::string EmulatedHm2::place() const {
-  return fmt::format("{} at {}:{}", options_.board.name, options_.address.substr(0, options_.address.find(':')), port_);
-}
-
-std::string EmulatedHm2::status() const {
-  constexpr int microseconds = 6;
-  return fmt::format("{}, {}, pins {}, cable {}, writes {}", state_text(*board_, microseconds),
-                     board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
-                     board_->drives_pins() ? "driven"
-                     : options_.is_node    ? "pulled low"
-                                           : "pulled high",
-                     link_.plugged() ? "in" : "out", board_->writes());
-}
-
-void EmulatedHm2::set_talker(const std::string& what) {
-  constexpr std::array<std::string_view, 4> names{"off", "read", "write", "drive"};
-  const auto found = std::ranges::find(names, what);
-  if (found == names.end()) throw std::invalid_argument("\"" + what + "\": give read, write, drive or off");
-  talker_ = static_cast<Talker>(found - names.begin());
-}
-
-std::span<const ControlRow<EmulatedHm2>> EmulatedHm2::rows() {
-  using Hm2 = EmulatedHm2;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Hm2>, 10> all{{
-      {"fault NAME[=NUMBER]",
-       "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage: of the "
-       "datagrams",
-       [](Hm2& hm2, const Command& c) { hm2.link_.set(c.text(1)); }},
-      {"link up|down", "the Ethernet cable; the rig goes on",
-       [](Hm2& hm2, const Command& c) { hm2.link_.plug(c.first_of(1, "up", "down")); }},
-      {"bite", "the watchdog bites now", [](Hm2& hm2, const Command&) { hm2.board_->bite(); }},
-      {"power-cycle", "the board is switched off and on; the wheels turn on",
-       [](Hm2& hm2, const Command&) { hm2.board_->power_cycle(); }},
-      {"talker read|write|drive|off", "another program sends every 10 ms: reads, writes its number, drives the brake",
-       [](Hm2& hm2, const Command& c) { hm2.set_talker(c.text(1)); }},
-      {"quadrature-error upper|lower", "a counter sees both lines change together",
-       [](Hm2& hm2, const Command& c) { hm2.board_->make_quadrature_error(c.first_of(1, "upper", "lower")); }},
-      estop_row<Hm2>,
-      turn_row<Hm2>,
-      {"changes FILE|off",
-       "each change of the outputs: when, ns of CLOCK_MONOTONIC (in lock-step of the board's time), drive, brake",
-       [](Hm2& hm2, const Command& c) { hm2.changes_.begin(c.text(1)); }},
-      {.usage = "registers", .meaning = "every register that a host has set", .answer = &Hm2::registers},
-  }};
-  return all;
-}
-
-std::string EmulatedHm2::obey(std::string_view line) {
-  catch_up();
-  std::string answer = obey_line(*this, line);
-  log_events();
-  return answer;
+std::unique_ptr<EmulatedBoard> emulated_hm2(const EmulatorOptions& options) {
+  return std::make_unique<EmulatedHm2>(options);
 }
 
 }  // namespace abs_hil::program

@@ -1,6 +1,4 @@
 // The emulated CAN node on a CAN interface or a Unix socket.
-#include "emulated_node.hpp"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/can.h>
@@ -19,6 +17,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "control.hpp"
+#include "emulator/can_node.hpp"
+
 namespace abs_hil::program {
 
 namespace {
@@ -35,158 +36,186 @@ void remove_old_socket(const std::string& path) {
   ::unlink(path.c_str());
 }
 
-}  // namespace
-
-BusSocket::BusSocket(const std::string& interface) {
-  if (interface.starts_with("unix:")) {
-    listen_at(interface.substr(5));
-  } else {
-    open_can(interface);
+/// The emulated node's end of the bus: a raw CAN socket, or for "unix:PATH" a listening AF_UNIX socket of type
+/// SOCK_SEQPACKET with one client at a time.
+class BusSocket {
+ public:
+  explicit BusSocket(const std::string& interface) {
+    if (interface.starts_with("unix:")) {
+      listen_at(interface.substr(5));
+    } else {
+      open_can(interface);
+    }
   }
-}
-
-BusSocket::~BusSocket() {
-  if (!path_.empty()) ::unlink(path_.c_str());
-}
-
-void BusSocket::open_can(const std::string& interface) {
-  client_ = driver::FileDescriptor(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW));
-  if (client_.get() < 0) refuse(interface + ": no CAN socket (sudo modprobe can_raw): ");
-  // ABS_TIME, ABS_SYNC, ABS_COMMAND, ABS_CONTROL.
-  constexpr canid_t exactly = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-  const can_filter filters[] = {{0x7F, exactly}, {0x80, exactly}, {0x81, exactly}, {0x82, exactly}};
-  const int on = 1;
-  if (::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0 ||
-      ::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) != 0) {
-    refuse(interface + ": ");
+  BusSocket(const BusSocket&) = delete;
+  BusSocket& operator=(const BusSocket&) = delete;
+  ~BusSocket() {
+    if (!path_.empty()) ::unlink(path_.c_str());
   }
-  ifreq request{};
-  std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
-  can_fd_ = ::ioctl(client_.get(), SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= static_cast<int>(CANFD_MTU);
-  sockaddr_can address{};
-  address.can_family = AF_CAN;
-  address.can_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
-  if (address.can_ifindex == 0) refuse(interface + ": ");
-  if (::bind(client_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) refuse(interface + ": ");
-}
 
-void BusSocket::listen_at(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.empty() || path.size() >= sizeof address.sun_path) {
-    throw std::invalid_argument("--can unix:" + path + ": give a path of 1 to 107 characters");
+  [[nodiscard]] int descriptor() const noexcept { return client_.get() >= 0 ? client_.get() : listening_.get(); }
+  [[nodiscard]] bool can_fd() const noexcept { return can_fd_; }
+  /// Takes the next frame; false if there is none.
+  [[nodiscard]] bool receive(emulator::BusFrame& frame) {
+    if (client_.get() < 0) {
+      client_ = driver::FileDescriptor(::accept4(listening_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    }
+    if (client_.get() < 0) return false;
+    canfd_frame raw{};
+    const ssize_t size = ::recv(client_.get(), &raw, sizeof raw, MSG_DONTWAIT);
+    if (size == 0 && listening_.get() >= 0) client_ = driver::FileDescriptor();
+    // An interface that goes down returns one error. The node then continues and receives nothing.
+    if (size != CAN_MTU && size != CANFD_MTU) return false;
+    frame = {.id = raw.can_id, .length = std::min<std::uint8_t>(raw.len, CANFD_MAX_DLEN), .fd = size == CANFD_MTU};
+    std::memcpy(frame.data.data(), raw.data, frame.length);
+    return true;
   }
-  std::memcpy(address.sun_path, path.c_str(), path.size());
-  listening_ = driver::FileDescriptor(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  remove_old_socket(path);
-  if (listening_.get() < 0 ||
-      ::bind(listening_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::listen(listening_.get(), 1) != 0) {
-    refuse("unix:" + path + ": ");
+  /// Sends a frame. If that is not possible at once, the frame is lost, as on a blocked bus.
+  void send(const emulator::BusFrame& frame) {
+    canfd_frame raw{};
+    raw.can_id = frame.id;
+    raw.len = frame.length;
+    if (frame.fd) raw.flags = CANFD_BRS;
+    std::memcpy(raw.data, frame.data.data(), frame.length);
+    static_cast<void>(::send(client_.get(), &raw, frame.fd ? CANFD_MTU : CAN_MTU, MSG_DONTWAIT | MSG_NOSIGNAL));
   }
-  path_ = path;
-}
 
-bool BusSocket::receive(emulator::BusFrame& frame) {
-  if (client_.get() < 0) {
-    client_ = driver::FileDescriptor(::accept4(listening_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+ private:
+  void open_can(const std::string& interface) {
+    client_ = driver::FileDescriptor(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW));
+    if (client_.get() < 0) refuse(interface + ": no CAN socket (sudo modprobe can_raw): ");
+    // ABS_TIME, ABS_SYNC, ABS_COMMAND, ABS_CONTROL.
+    constexpr canid_t exactly = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+    const can_filter filters[] = {{0x7F, exactly}, {0x80, exactly}, {0x81, exactly}, {0x82, exactly}};
+    const int on = 1;
+    if (::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0 ||
+        ::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) != 0) {
+      refuse(interface + ": ");
+    }
+    ifreq request{};
+    std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
+    can_fd_ = ::ioctl(client_.get(), SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= static_cast<int>(CANFD_MTU);
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    address.can_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
+    if (address.can_ifindex == 0) refuse(interface + ": ");
+    if (::bind(client_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      refuse(interface + ": ");
   }
-  if (client_.get() < 0) return false;
-  canfd_frame raw{};
-  const ssize_t size = ::recv(client_.get(), &raw, sizeof raw, MSG_DONTWAIT);
-  if (size == 0 && listening_.get() >= 0) client_ = driver::FileDescriptor();
-  // An interface that goes down returns one error. The node then continues and receives nothing.
-  if (size != CAN_MTU && size != CANFD_MTU) return false;
-  frame = {.id = raw.can_id, .length = std::min<std::uint8_t>(raw.len, CANFD_MAX_DLEN), .fd = size == CANFD_MTU};
-  std::memcpy(frame.data.data(), raw.data, frame.length);
-  return true;
-}
+  void listen_at(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (path.empty() || path.size() >= sizeof address.sun_path) {
+      throw std::invalid_argument("--can unix:" + path + ": give a path of 1 to 107 characters");
+    }
+    std::memcpy(address.sun_path, path.c_str(), path.size());
+    listening_ = driver::FileDescriptor(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    remove_old_socket(path);
+    if (listening_.get() < 0 ||
+        ::bind(listening_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(listening_.get(), 1) != 0) {
+      refuse("unix:" + path + ": ");
+    }
+    path_ = path;
+  }
 
-void BusSocket::send(const emulator::BusFrame& frame) {
-  canfd_frame raw{};
-  raw.can_id = frame.id;
-  raw.len = frame.length;
-  if (frame.fd) raw.flags = CANFD_BRS;
-  std::memcpy(raw.data, frame.data.data(), frame.length);
-  static_cast<void>(::send(client_.get(), &raw, frame.fd ? CANFD_MTU : CAN_MTU, MSG_DONTWAIT | MSG_NOSIGNAL));
-}
-
-namespace {
+  driver::FileDescriptor listening_{};
+  driver::FileDescriptor client_{};
+  bool can_fd_{true};
+  std::string path_{};
+};
 
 const char* name_of(emulator::CanNode::State state) {
-  switch (state) {
-    case emulator::CanNode::State::inactive: return "inactive";
-    case emulator::CanNode::State::active: return "active";
-    case emulator::CanNode::State::latched: return "latched";
-  }
-  return "unknown";
+  constexpr std::array<const char*, 3> names{"inactive", "active", "latched"};
+  return names[static_cast<std::size_t>(state)];
 }
 
-emulator::CanNodeOptions with_fd(emulator::CanNodeOptions options, bool can_fd) {
-  options.can_fd = can_fd;
-  return options;
-}
+/// The CAN I/O node on its bus.
+class EmulatedNode final : public EmulatedBoard {
+ public:
+  /// The bus decides about CAN FD.
+  explicit EmulatedNode(const EmulatorOptions& options)
+      : interface_(options.can_interface),
+        bus_(interface_),
+        options_{.plant = options.card.plant,
+                 .start_speed_rad_s = options.card.start_speed_rad_s,
+                 .watchdog_ms = options.watchdog_ms,
+                 .lock_step = options.lock_step,
+                 .can_fd = bus_.can_fd(),
+                 .supply_min_V = options.card.supply_min_V,
+                 .temperature_max_C = static_cast<double>(options.card.temperature_max_C),
+                 .overspeed_rpm = options.card.overspeed_rpm},
+        node_(options_),
+        faults_(options.seed),
+        time_(options_.lock_step) {}
+
+  [[nodiscard]] int descriptor() const override { return bus_.descriptor(); }
+  void catch_up() override {
+    time_.catch_up(node_);
+    take_log(node_.log(), time_.start_ns());
+  }
+  bool serve() override {
+    emulator::BusFrame frame;
+    while (bus_.receive(frame)) {
+      if (!faults_.hears(frame)) continue;
+      time_.catch_up(node_);
+      node_.receive(frame);
+      for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus_.send(answer);
+    }
+    take_log(node_.log(), time_.start_ns());
+    return true;
+  }
+  std::string obey(std::string_view line) override {
+    catch_up();
+    return obey_line(*this, line);
+  }
+  [[nodiscard]] std::string status() const override {
+    constexpr int microseconds = 6;
+    return fmt::format("{}, trip flags {:#x}, {}, {} commands rejected", state_text(node_, microseconds),
+                       node_.trip_flags(), name_of(node_.state()), node_.rejected());
+  }
+  [[nodiscard]] std::string place() const override { return "CAN node on " + interface_; }
+  [[nodiscard]] static std::span<const ControlRow<EmulatedNode>> rows() {
+    using Node = EmulatedNode;
+    using Command = ControlCommand;
+    static constexpr std::array<ControlRow<Node>, 7> all{{
+        {"fault NAME[=NUMBER]",
+         "ok silent deaf no-deactivate drop= no-status no-outputs stale= ahead= stuck duplicate swapped wrong-size= "
+         "corrupt nonsense babble=",
+         [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
+        {"restart", "the node is switched off and on: inactive, its clock at 0",
+         [](Node& node, const Command&) { node.power_on(); }},
+        estop_row<Node>,
+        supply_row<Node>,
+        temperature_row<Node>,
+        overspeed_row<Node>,
+        {"brake-error DUTY", "the brake's duty is off by this from what is commanded",
+         [](Node& node, const Command& c) { node.node_.break_brake_output(c.number(1)); }},
+    }};
+    return all;
+  }
+  [[nodiscard]] emulator::CanNode& model() noexcept { return node_; }
+
+ private:
+  void power_on() {
+    node_ = emulator::CanNode(options_);
+    time_.restart();
+  }
+
+  std::string interface_;
+  BusSocket bus_;
+  emulator::CanNodeOptions options_;
+  emulator::CanNode node_;
+  emulator::NodeFaults faults_;
+  BoardTime time_;
+};
 
 }  // namespace
 
-EmulatedNode::EmulatedNode(emulator::CanNodeOptions options, std::uint64_t seed, const std::string& interface)
-    : bus_(interface),
-      options_(with_fd(std::move(options), bus_.can_fd())),
-      node_(options_),
-      faults_(seed),
-      time_(options_.lock_step) {}
+std::string commands_of_can_node() { return help_of(EmulatedNode::rows()); }
 
-void EmulatedNode::power_on() {
-  node_ = emulator::CanNode(options_);
-  time_.restart();
-}
-
-void EmulatedNode::catch_up() {
-  time_.catch_up(node_);
-  take_log(node_.log(), time_.start_ns());
-}
-
-bool EmulatedNode::serve() {
-  emulator::BusFrame frame;
-  while (bus_.receive(frame)) {
-    if (!faults_.hears(frame)) continue;
-    time_.catch_up(node_);
-    node_.receive(frame);
-    for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus_.send(answer);
-  }
-  take_log(node_.log(), time_.start_ns());
-  return true;
-}
-
-std::string EmulatedNode::status() const {
-  constexpr int microseconds = 6;
-  return fmt::format("{}, trip flags {:#x}, {}, {} commands rejected", state_text(node_, microseconds),
-                     node_.trip_flags(), name_of(node_.state()), node_.rejected());
-}
-
-std::span<const ControlRow<EmulatedNode>> EmulatedNode::rows() {
-  using Node = EmulatedNode;
-  using Command = ControlCommand;
-  static constexpr std::array<ControlRow<Node>, 7> all{{
-      {"fault NAME[=NUMBER]",
-       "ok silent deaf no-deactivate drop= no-status no-outputs stale= ahead= stuck duplicate swapped wrong-size= "
-       "corrupt nonsense babble=",
-       [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
-      {"restart", "the node is switched off and on: inactive, its clock at 0",
-       [](Node& node, const Command&) { node.power_on(); }},
-      estop_row<Node>,
-      supply_row<Node>,
-      temperature_row<Node>,
-      overspeed_row<Node>,
-      {"brake-error DUTY", "the brake's duty is off by this from what is commanded",
-       [](Node& node, const Command& c) { node.node_.break_brake_output(c.number(1)); }},
-  }};
-  return all;
-}
-
-std::string EmulatedNode::obey(std::string_view line) {
-  catch_up();
-  return obey_line(*this, line);
+std::unique_ptr<EmulatedBoard> emulated_can_node(const EmulatorOptions& options) {
+  return std::make_unique<EmulatedNode>(options);
 }
 
 }  // namespace abs_hil::program

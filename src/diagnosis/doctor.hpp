@@ -7,7 +7,7 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "diagnosis/finding.hpp"
-#include "driver/can/interface_facts.hpp"
+#include "driver/can/bus.hpp"
 #include "driver/factory.hpp"
 #include "driver/hm2/hm2_driver.hpp"
 #include "runtime/realtime_setup.hpp"

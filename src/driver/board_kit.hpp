@@ -3,12 +3,14 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
@@ -29,44 +31,35 @@ enum class Standing : std::uint8_t {
   unknown,     ///< these sources are silent or disagree: the driver never relies on it
 };
 [[nodiscard]] constexpr std::string_view name_of(Standing standing) noexcept {
-  switch (standing) {
-    case Standing::documented: return "documented";
-    case Standing::inferred: return "inferred";
-    case Standing::unknown: return "unknown";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 3> names{"documented", "inferred", "unknown"};
+  return names[static_cast<std::size_t>(standing)];
 }
 
 /// Ends the program with status 3. `what` names the board, the cause and the fix.
 [[noreturn]] inline void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
 
-/// Throws std::invalid_argument, naming the key, unless `sign` is 1 or -1.
-inline void check_sign(const std::string& key, std::int32_t sign) {
-  if (sign == 1 || sign == -1) return;
-  throw std::invalid_argument(key + " = " + std::to_string(sign) + ": give 1 or -1");
-}
-
-/// Throws std::invalid_argument, naming the keys, if both have the same value.
-/// @param board  prefix of the keys, "driver.pci."
-inline void check_different(const std::string& board, const char* first, std::int32_t of_first, const char* second,
-                            std::int32_t of_second, const char* why) {
-  if (of_first != of_second) return;
-  throw std::invalid_argument(board + first + " = " + board + second + " = " + std::to_string(of_second) + ": " + why);
-}
-
 /// Throws std::invalid_argument, naming the key, if an option is outside its range.
+/// @param board  prefix of the keys, "driver.pci."
 template <class Options>
 void check_options(const std::string& board, const Options& options) {
   rig::require_valid(options, board);
-  check_sign(board + "lower_sign", options.lower_sign);
-  check_sign(board + "upper_sign", options.upper_sign);
+  for (const auto& [key, sign] : {std::pair("lower_sign", options.lower_sign), {"upper_sign", options.upper_sign}}) {
+    if (sign == 1 || sign == -1) continue;
+    throw std::invalid_argument(board + key + " = " + std::to_string(sign) + ": give 1 or -1");
+  }
+  const auto require_different = [&board](const char* first, std::int32_t of_first, const char* second,
+                                          std::int32_t of_second, const char* why) {
+    if (of_first != of_second) return;
+    throw std::invalid_argument(board + first + " = " + board + second + " = " + std::to_string(of_second) + ": " +
+                                why);
+  };
   if constexpr (requires { options.lower_channel; }) {
-    check_different(board, "lower_channel", options.lower_channel, "upper_channel", options.upper_channel,
-                    "each wheel has an encoder of its own");
+    require_different("lower_channel", options.lower_channel, "upper_channel", options.upper_channel,
+                      "each wheel has an encoder of its own");
   }
   if constexpr (requires { options.drive_pwm; }) {
-    check_different(board, "drive_pwm", options.drive_pwm, "brake_pwm", options.brake_pwm,
-                    "drive and brake need different PWMs");
+    require_different("drive_pwm", options.drive_pwm, "brake_pwm", options.brake_pwm,
+                      "drive and brake need different PWMs");
   }
 }
 
@@ -101,6 +94,12 @@ template <class Options>
   const double most = slack_counts + options.plausible_speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns /
                                          rig::radians_per_count(options.encoder_counts_per_rev);
   return std::abs(static_cast<double>(rig::counts_between(before, after))) <= most;
+}
+
+/// Counts travelled between two readings of a counter that wraps and is their lowest `bits` bits. Real-time safe.
+[[nodiscard]] inline std::int32_t travelled(std::uint32_t before, std::uint32_t after, unsigned bits) noexcept {
+  const unsigned unused = 32U - bits;
+  return std::bit_cast<std::int32_t>((after - before) << unused) >> unused;
 }
 
 /// The count after `moved` more; it wraps.

@@ -8,23 +8,10 @@ namespace abs_hil::driver {
 
 namespace {
 
-[[noreturn]] void refuse() {
+/// Stands for any function of a row.
+template <class Part>
+Part refuse(auto&&... /*what it is made from*/) {
   throw Unavailable("--backend rig: only Linux has drivers for boards; run it there, or use --backend sim");
-}
-
-template <class Options>
-std::unique_ptr<RigDriver> no_driver(const Options& /*options*/, const RunFacts& /*run*/) {
-  refuse();
-}
-
-template <class Options>
-std::unique_ptr<SafeStateWriter> no_writer(const Options& /*options*/, const RunFacts& /*run*/) {
-  refuse();
-}
-
-template <class Options>
-OutputGrid no_outputs(const Options& /*options*/) {
-  refuse();
 }
 
 template <class Options>
@@ -32,9 +19,9 @@ Backend named(std::string_view name) {
   return backend<Options>({.name = name,
                            .summary = "a board; only Linux has its driver",
                            .not_verified = "Only Linux has its driver",
-                           .make_driver = no_driver<Options>,
-                           .make_safe_state_writer = no_writer<Options>,
-                           .outputs = no_outputs<Options>});
+                           .make_driver = refuse<std::unique_ptr<RigDriver>>,
+                           .make_safe_state_writer = refuse<std::unique_ptr<SafeStateWriter>>,
+                           .outputs = refuse<OutputGrid>});
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -113,27 +114,7 @@ class CanNode final : public RigBehind {
   OutputLog log_{"last valid command"};
 };
 
-/// Faults of a node and of its bus. The names are those of the control command `fault NAME[=NUMBER]`.
-enum class NodeFaultKind : std::uint8_t {
-  ok,             ///< no fault: heals the node
-  silent,         ///< sends nothing
-  deaf,           ///< takes no command, but answers
-  no_deactivate,  ///< is never told to deactivate
-  drop,           ///< the next NUMBER answers are lost, then ok
-  no_status,      ///< STATUS is never sent
-  no_outputs,     ///< OUTPUTS is never sent
-  stale,          ///< sequences NUMBER behind
-  ahead,          ///< sequences NUMBER ahead
-  stuck,          ///< repeats the answer that it gave when the fault began
-  duplicate,      ///< sends every frame twice
-  swapped,        ///< ends its answer with the counters instead of their time
-  wrong_size,     ///< frames are NUMBER bytes long
-  corrupt,        ///< wrong checksums
-  nonsense,       ///< random counters
-  babble,         ///< NUMBER frames of other identifiers and as many forged ones of its own before each answer
-};
-
-/// Applies a fault between a node and its bus.
+/// Applies a fault between a node and its bus. The names are those of the control command `fault NAME[=NUMBER]`.
 class NodeFaults {
  public:
   explicit NodeFaults(std::uint64_t seed) : random_(seed) {}
@@ -146,10 +127,10 @@ class NodeFaults {
   [[nodiscard]] std::vector<BusFrame> answer(std::vector<BusFrame> frames);
 
  private:
-  [[nodiscard]] std::vector<BusFrame> changed(std::vector<BusFrame> frames);
-  void prepend_babble(std::vector<BusFrame>& frames);
+  struct Row;
+  static const std::array<Row, 16> rows;
 
-  NodeFaultKind kind_{NodeFaultKind::ok};
+  std::size_t row_{0};
   unsigned number_{0};
   std::vector<BusFrame> kept_{};
   std::mt19937_64 random_;

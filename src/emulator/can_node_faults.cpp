@@ -10,129 +10,119 @@ namespace abs_hil::emulator {
 
 namespace {
 
-// In the order of NodeFaultKind.
-constexpr std::array<FaultName, 16> node_faults{{{"ok"},
-                                                 {"silent"},
-                                                 {"deaf"},
-                                                 {"no-deactivate"},
-                                                 {"drop=ANSWERS", 0, 100'000, true},
-                                                 {"no-status"},
-                                                 {"no-outputs"},
-                                                 {"stale=N", 0, 127, true},
-                                                 {"ahead=N", 0, 127, true},
-                                                 {"stuck"},
-                                                 {"duplicate"},
-                                                 {"swapped"},
-                                                 {"wrong-size=BYTES", 0, 8, true},
-                                                 {"corrupt"},
-                                                 {"nonsense"},
-                                                 {"babble=FRAMES", 0, 100, true}}};
+using Frames = std::vector<BusFrame>;
 
 bool is_measurement(const BusFrame& frame) { return frame.id >= 0x92 && frame.id <= 0x94; }
 
-/// Byte of the sequence in the node's frames, except ABS_IDENTITY.
-std::size_t sequence_place(const BusFrame& frame) { return frame.length - 2U; }
-
-void shift_sequence(BusFrame& frame, unsigned by) {
-  if (frame.id == 0x9A) return;
-  std::uint8_t& sequence = frame.data[sequence_place(frame)];
-  sequence = static_cast<std::uint8_t>(sequence + by);
-  seal(frame);
+void shift_sequences(Frames& frames, unsigned by) {
+  for (BusFrame& frame : frames) {
+    if (frame.id == 0x9A) continue;  // ABS_IDENTITY has none
+    std::uint8_t& sequence = frame.data[frame.length - 2U];
+    sequence = static_cast<std::uint8_t>(sequence + by);
+    seal(frame);
+  }
 }
+
+bool is_command(const BusFrame& frame) { return frame.id == 0x81; }
+bool is_deactivation(const BusFrame& frame) { return frame.id == 0x82 && frame.data[0] == 3; }
 
 }  // namespace
 
+struct NodeFaults::Row {
+  FaultName name;
+  void (*change)(NodeFaults&, Frames&){nullptr};  ///< null: the frames stay as they are
+  bool always{false};                             ///< it also changes the answers to ABS_CONTROL
+  bool (*deaf_to)(const BusFrame&){nullptr};      ///< null: it hears all frames
+};
+
+// The first one is no fault: it heals the node.
+constexpr std::array<NodeFaults::Row, 16> NodeFaults::rows{{
+    {{"ok"}},
+    {{"silent"}, [](NodeFaults&, Frames& frames) { frames.clear(); }, true},
+    {.name = {"deaf"}, .deaf_to = is_command},  // takes no command, but answers
+    {.name = {"no-deactivate"}, .deaf_to = is_deactivation},
+    {{"drop=ANSWERS", 0, 100'000, true},  // so many are lost, then ok
+     [](NodeFaults& faults, Frames& frames) {
+       if (faults.number_ > 0) frames.clear();
+       if (faults.number_ <= 1) {
+         faults.row_ = 0;
+       } else {
+         --faults.number_;
+       }
+     }},
+    {{"no-status"}, [](NodeFaults&, Frames& frames) { std::erase_if(frames, [](auto& f) { return f.id == 0x90; }); }},
+    {{"no-outputs"}, [](NodeFaults&, Frames& frames) { std::erase_if(frames, [](auto& f) { return f.id == 0x91; }); }},
+    {{"stale=N", 0, 127, true},  // sequences behind
+     [](NodeFaults& faults, Frames& frames) { shift_sequences(frames, 256U - faults.number_); }},
+    {{"ahead=N", 0, 127, true}, [](NodeFaults& faults, Frames& frames) { shift_sequences(frames, faults.number_); }},
+    {{"stuck"},  // repeats the answer that it gave when the fault began
+     [](NodeFaults& faults, Frames& frames) {
+       if (faults.kept_.empty()) faults.kept_ = frames;
+       frames = faults.kept_;
+     }},
+    {{"duplicate"},  // sends every frame twice
+     [](NodeFaults&, Frames& frames) {
+       Frames twice;
+       for (const BusFrame& frame : frames) twice.insert(twice.end(), 2, frame);
+       frames = std::move(twice);
+     }},
+    // Ends its answer with the counters instead of their time.
+    {{"swapped"}, [](NodeFaults&, Frames& frames) { std::ranges::reverse(frames); }},
+    {{"wrong-size=BYTES", 0, 8, true},
+     [](NodeFaults& faults, Frames& frames) {
+       for (BusFrame& frame : frames) frame.length = static_cast<std::uint8_t>(faults.number_);
+     },
+     true},
+    {{"corrupt"},  // wrong checksums
+     [](NodeFaults&, Frames& frames) {
+       for (BusFrame& frame : frames) frame.data[frame.length - 1U] ^= 0x55U;
+     },
+     true},
+    {{"nonsense"},  // random counters
+     [](NodeFaults& faults, Frames& frames) {
+       for (BusFrame& frame : frames) {
+         if (frame.id != 0x92 && frame.id != 0x94) continue;
+         frame.data[2] = static_cast<std::uint8_t>(faults.random_());
+         seal(frame);
+       }
+     }},
+    {{"babble=FRAMES", 0, 100, true},  // of other identifiers, and as many forged ones of its own, before each answer
+     [](NodeFaults& faults, Frames& frames) {
+       Frames all;
+       for (unsigned i = 0; i < faults.number_; ++i) {
+         BusFrame other{.id = 0x100 + static_cast<std::uint32_t>(faults.random_() % 0x600), .length = 8};
+         BusFrame forged{.id = 0x92 + static_cast<std::uint32_t>(faults.random_() % 2), .length = 8};
+         for (std::size_t byte = 0; byte < 8; ++byte) {
+           other.data[byte] = static_cast<std::uint8_t>(faults.random_());
+           forged.data[byte] = static_cast<std::uint8_t>(faults.random_());
+         }
+         all.push_back(other);
+         all.push_back(forged);
+       }
+       frames.insert(frames.begin(), all.begin(), all.end());
+     }},
+}};
+
 void NodeFaults::set(std::string_view text) {
-  const auto given = fault_in(text, node_faults);
-  if (!given) refuse_fault(text, "one of " + usages_of(node_faults, " "));
-  kind_ = static_cast<NodeFaultKind>(given->place);
+  std::array<FaultName, rows.size()> names{};
+  std::ranges::transform(rows, names.begin(), &Row::name);
+  const auto given = fault_in(text, names);
+  if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
+  row_ = given->place;
   number_ = static_cast<unsigned>(given->number);
   kept_.clear();
 }
 
 bool NodeFaults::hears(const BusFrame& frame) const noexcept {
-  constexpr std::uint8_t deactivate = 3;
-  switch (kind_) {
-    case NodeFaultKind::deaf: return frame.id != 0x81;
-    case NodeFaultKind::no_deactivate: return frame.id != 0x82 || frame.data[0] != deactivate;
-    default: return true;
-  }
-}
-
-void NodeFaults::prepend_babble(std::vector<BusFrame>& frames) {
-  std::vector<BusFrame> all;
-  for (unsigned i = 0; i < number_; ++i) {
-    BusFrame other{.id = 0x100 + static_cast<std::uint32_t>(random_() % 0x600), .length = 8};
-    BusFrame forged{.id = 0x92 + static_cast<std::uint32_t>(random_() % 2), .length = 8};
-    for (std::size_t byte = 0; byte < 8; ++byte) {
-      other.data[byte] = static_cast<std::uint8_t>(random_());
-      forged.data[byte] = static_cast<std::uint8_t>(random_());
-    }
-    all.push_back(other);
-    all.push_back(forged);
-  }
-  all.insert(all.end(), frames.begin(), frames.end());
-  frames = std::move(all);
-}
-
-std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
-  using enum NodeFaultKind;
-  switch (kind_) {
-    case silent: frames.clear(); break;
-    case drop:
-      if (number_ > 0) frames.clear();
-      if (number_ <= 1) {
-        kind_ = ok;
-      } else {
-        --number_;
-      }
-      break;
-    case no_status: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x90; }); break;
-    case no_outputs: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x91; }); break;
-    case stale:
-      for (BusFrame& frame : frames) shift_sequence(frame, 256U - number_);
-      break;
-    case ahead:
-      for (BusFrame& frame : frames) shift_sequence(frame, number_);
-      break;
-    case stuck:
-      if (kept_.empty()) kept_ = frames;
-      frames = kept_;
-      break;
-    case duplicate: {
-      std::vector<BusFrame> twice;
-      for (const BusFrame& frame : frames) twice.insert(twice.end(), 2, frame);
-      frames = std::move(twice);
-      break;
-    }
-    case swapped: std::reverse(frames.begin(), frames.end()); break;
-    case wrong_size:
-      for (BusFrame& frame : frames) frame.length = static_cast<std::uint8_t>(number_);
-      break;
-    case corrupt:
-      for (BusFrame& frame : frames) frame.data[frame.length - 1U] ^= 0x55U;
-      break;
-    case nonsense:
-      for (BusFrame& frame : frames) {
-        if (frame.id != 0x92 && frame.id != 0x94) continue;
-        frame.data[2] = static_cast<std::uint8_t>(random_());
-        seal(frame);
-      }
-      break;
-    case babble: prepend_babble(frames); break;
-    case ok:
-    case deaf:
-    case no_deactivate: break;
-  }
-  return frames;
+  return rows[row_].deaf_to == nullptr || !rows[row_].deaf_to(frame);
 }
 
 std::vector<BusFrame> NodeFaults::answer(std::vector<BusFrame> frames) {
-  using enum NodeFaultKind;
-  const bool to_sync = std::any_of(frames.begin(), frames.end(), is_measurement);
+  const Row& row = rows[row_];
   // Only faults that silence the node or corrupt its frames change the answers to ABS_CONTROL.
-  const bool always = kind_ == silent || kind_ == wrong_size || kind_ == corrupt;
-  return frames.empty() || (!to_sync && !always) ? frames : changed(std::move(frames));
+  const bool acts = row.always || std::ranges::any_of(frames, is_measurement);
+  if (!frames.empty() && acts && row.change != nullptr) row.change(*this, frames);
+  return frames;
 }
 
 }  // namespace abs_hil::emulator

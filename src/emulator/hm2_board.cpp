@@ -2,9 +2,10 @@
 //   15 write | 14 address follows | 13 info area | 12-10 space | 9-8 bytes a unit, log2 | 7 increment | 6-0 units
 // Sources: Mesa's manual of the 7I92, chapter LBP16; frames that LinuxCNC exchanged with another emulator.
 
-#include "emulator/hm2_board.hpp"
-
 #include <algorithm>
+#include <array>
+
+#include "emulator/hm2_fpga.hpp"
 
 namespace abs_hil::emulator {
 
@@ -43,169 +44,178 @@ constexpr std::uint32_t eeprom_key = 0x5A02;
 constexpr std::uint32_t flash_id_address = 0x08;
 constexpr std::uint32_t flash_id = 0x14;
 
-}  // namespace
+class Hm2Board final : public Hm2Fpga {
+ public:
+  explicit Hm2Board(const Hm2Options& options) : Hm2Fpga(options) { start(); }
 
-Hm2Board::Hm2Board(const Hm2Options& options) : Hm2Fpga(options) { power_cycle(); }
-
-void Hm2Board::power_cycle() {
-  memory_ = {};
-  pointers_ = {};
-  power_on_ns_ = time_ns();
-  for (std::uint32_t i = 0; i < options_.name.size(); ++i) {
-    memory_[board_info][i] = memory_[eeprom][0x10 + i] = static_cast<std::uint8_t>(options_.name[i]);
-  }
-  put(board_info, 0x10, 2, identity_.lbp_version);
-  put(board_info, 0x12, 2, identity_.firmware_version);
-  for (std::uint32_t i = 0; i < options_.mac.size(); ++i) memory_[eeprom][2 + i] = options_.mac[5 - i];
-  for (std::uint32_t i = 0; i < options_.address.size(); ++i) memory_[eeprom][0x20 + i] = options_.address[3 - i];
-  power_on();
-}
-
-Hm2Board::Access Hm2Board::decoded(std::uint32_t command) noexcept {
-  return {.write = (command & 0x8000U) != 0,
-          .info = (command & 0x2000U) != 0,
-          .increment = (command & 0x80U) != 0,
-          .space = command >> 10U & 7U,
-          .unit_bytes = 1U << (command >> 8U & 3U),
-          .units = command & 0x7FU};
-}
-
-bool Hm2Board::takes(const Access& access) const noexcept {
-  if (access.space == lock_step && !options_.lock_step) return false;
-  if (access.info) return !access.write && access.unit_bytes == 2;
-  const SpaceFacts& facts = spaces[access.space];
-  const std::uint32_t any = access.space == flash ? 0x07U : facts.sizes & 0x0FU;
-  return (any & access.unit_bytes) != 0;
-}
-
-std::vector<std::uint8_t> Hm2Board::answer(std::span<const std::uint8_t> datagram) {
-  bump(control, rx_packets);
-  bump(control, rx_packets + 2);
-  std::vector<std::uint8_t> reply;
-  bool wrote = false;
-  std::size_t at = 0;
-  const auto take = [&](std::size_t count) {
-    std::uint64_t value = 0;
-    for (std::size_t i = count; i > 0; --i) value = value << 8U | datagram[at + i - 1];
-    at += count;
-    return value;
-  };
-  while (at < datagram.size()) {
-    const std::size_t left = datagram.size() - at;
-    const bool has_address = left >= 2 && (datagram[at + 1] & 0x40U) != 0;
-    if (left < (has_address ? 4U : 2U)) {
-      count_error(parse_error);
-      break;
-    }
-    const Access access = decoded(static_cast<std::uint32_t>(take(2)));
-    std::uint32_t address = has_address ? static_cast<std::uint32_t>(take(2)) : pointers_[access.space];
-    const std::size_t size = std::size_t{access.units} * access.unit_bytes;
-    if (access.write ? datagram.size() - at < size : reply.size() + size > largest_answer) {
-      count_error(parse_error);
-      break;
-    }
-    const bool taken = takes(access);
-    if (!taken) count_error(memory_error);
-    wrote = wrote || (access.write && access.space != timers && access.space != lock_step);
-    for (std::uint32_t unit = 0; unit < access.units; ++unit) {
-      if (access.write) {
-        const std::uint64_t value = take(access.unit_bytes);
-        if (taken) write(access, address, value);
-      } else {
-        const std::uint64_t value = taken ? read(access, address) : 0;
-        for (std::uint32_t i = 0; i < access.unit_bytes; ++i) {
-          reply.push_back(static_cast<std::uint8_t>(value >> 8U * i));
-        }
+  [[nodiscard]] std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) override {
+    bump(control, rx_packets);
+    bump(control, rx_packets + 2);
+    std::vector<std::uint8_t> reply;
+    bool wrote = false;
+    std::size_t at = 0;
+    const auto take = [&](std::size_t count) {
+      std::uint64_t value = 0;
+      for (std::size_t i = count; i > 0; --i) value = value << 8U | datagram[at + i - 1];
+      at += count;
+      return value;
+    };
+    while (at < datagram.size()) {
+      const std::size_t left = datagram.size() - at;
+      const bool has_address = left >= 2 && (datagram[at + 1] & 0x40U) != 0;
+      if (left < (has_address ? 4U : 2U)) {
+        count_error(parse_error);
+        break;
       }
-      if (access.increment) address = (address + access.unit_bytes) & 0xFFFFU;
+      const Access access = decoded(static_cast<std::uint32_t>(take(2)));
+      std::uint32_t address = has_address ? static_cast<std::uint32_t>(take(2)) : pointers_[access.space];
+      const std::size_t size = std::size_t{access.units} * access.unit_bytes;
+      if (access.write ? datagram.size() - at < size : reply.size() + size > largest_hm2_answer) {
+        count_error(parse_error);
+        break;
+      }
+      const bool taken = takes(access);
+      if (!taken) count_error(memory_error);
+      wrote = wrote || (access.write && access.space != timers && access.space != lock_step);
+      for (std::uint32_t unit = 0; unit < access.units; ++unit) {
+        if (access.write) {
+          const std::uint64_t value = take(access.unit_bytes);
+          if (taken) write(access, address, value);
+        } else {
+          const std::uint64_t value = taken ? read(access, address) : 0;
+          for (std::uint32_t i = 0; i < access.unit_bytes; ++i) {
+            reply.push_back(static_cast<std::uint8_t>(value >> 8U * i));
+          }
+        }
+        if (access.increment) address = (address + access.unit_bytes) & 0xFFFFU;
+      }
+      if (!access.info) pointers_[access.space] = address;
     }
-    if (!access.info) pointers_[access.space] = address;
+    if (wrote) ++writes_;
+    if (!reply.empty()) {
+      bump(control, tx_packets);
+      bump(control, tx_packets + 2);
+    }
+    return reply;
   }
-  if (wrote) ++writes_;
-  if (!reply.empty()) {
-    bump(control, tx_packets);
-    bump(control, tx_packets + 2);
-  }
-  return reply;
-}
+  void power_cycle() override { start(); }
 
-std::uint32_t Hm2Board::info_word(std::uint32_t space, std::uint32_t address) const noexcept {
-  const SpaceFacts& facts = spaces[space];
-  switch (address) {
-    case 0x00: return 0x5A00U + space;
-    case 0x02: return facts.sizes;
-    case 0x04: return facts.ranges;
-    case 0x06: return pointers_[space];
-    case 0x08:
-    case 0x0A:
-    case 0x0C:
-    case 0x0E:
-      return static_cast<std::uint8_t>(facts.name[address - 8]) |
-             static_cast<std::uint32_t>(static_cast<std::uint8_t>(facts.name[address - 7])) << 8U;
-    default: return 0;
-  }
-}
+ private:
+  static constexpr std::uint32_t space_count = 8;
+  static constexpr std::uint32_t memory_bytes = 0x80;
+  struct Access {
+    bool write, info, increment;
+    std::uint32_t space, unit_bytes, units;
+  };
+  using Memory = std::array<std::uint8_t, memory_bytes>;
 
-std::uint64_t Hm2Board::bytes(const Memory& memory, std::uint32_t address, std::uint32_t count) const noexcept {
-  std::uint64_t value = 0;
-  for (std::uint32_t i = count; i > 0; --i) {
-    const std::uint32_t place = address + i - 1;
-    value = value << 8U | (place < memory.size() ? memory[place] : 0U);
-  }
-  return value;
-}
-
-void Hm2Board::put(std::uint32_t space, std::uint32_t address, std::uint32_t count, std::uint64_t value) noexcept {
-  for (std::uint32_t i = 0; i < count && address + i < memory_bytes; ++i) {
-    memory_[space][address + i] = static_cast<std::uint8_t>(value >> 8U * i);
-  }
-}
-
-void Hm2Board::bump(std::uint32_t space, std::uint32_t address) noexcept {
-  put(space, address, 2, bytes(memory_[space], address, 2) + 1);
-}
-
-void Hm2Board::count_error(std::uint32_t bit) {
-  memory_[control][0] = static_cast<std::uint8_t>(memory_[control][0] | bit);
-  bump(control, bit == parse_error ? error_counts : bit == memory_error ? error_counts + 2 : error_counts + 4);
-}
-
-std::uint64_t Hm2Board::read(const Access& access, std::uint32_t address) const noexcept {
-  if (access.info) return info_word(access.space, address);
-  if (access.space == hostmot2) return read32(address & 0xFFFCU);
-  if (access.space == flash) return address == flash_id_address ? flash_id : 0;
-  if (access.space == timers && address == 0) {
-    return static_cast<std::uint64_t>((time_ns() - power_on_ns_) / 1000) & 0xFFFFU;
-  }
-  if (access.space == lock_step) {
-    Memory time{};
-    for (std::uint32_t i = 0; i < 8; ++i) time[i] = static_cast<std::uint8_t>(time_ns() >> 8U * i);
-    return bytes(time, address, access.unit_bytes);
-  }
-  return bytes(memory_[access.space], address, access.unit_bytes);
-}
-
-void Hm2Board::write(const Access& access, std::uint32_t address, std::uint64_t value) {
-  if (access.space == hostmot2) return write32(address & 0xFFFCU, static_cast<std::uint32_t>(value));
-  const bool read_only = access.space == board_info || access.space == flash || access.space == ethernet_chip;
-  const bool locked = access.space == eeprom && bytes(memory_[control], eeprom_enable, 2) != eeprom_key;
-  if (read_only || locked) return count_error(write_error);
-  put(access.space, address, access.unit_bytes, value);
-  if (access.space == eeprom) put(control, eeprom_enable, 2, 0);  // the key opens it for one write
-  if (access.space == control) write_control(address);
-  if (access.space == lock_step && address + access.unit_bytes == 8) {
-    advance_to(static_cast<std::int64_t>(std::min<std::uint64_t>(
-        bytes(memory_[lock_step], 0, 8), static_cast<std::uint64_t>(time_ns()) + 10'000'000'000U)));
-  }
-}
-
-void Hm2Board::write_control(std::uint32_t address) {
-  if (address == reset_register && bytes(memory_[control], address, 2) != 0) {
-    power_cycle();
-  } else if (address == reload_register && bytes(memory_[control], address, 2) != 0) {
-    put(control, address, 2, 0);
+  void start() {
+    memory_ = {};
+    pointers_ = {};
+    power_on_ns_ = time_ns();
+    for (std::uint32_t i = 0; i < options_.name.size(); ++i) {
+      memory_[board_info][i] = memory_[eeprom][0x10 + i] = static_cast<std::uint8_t>(options_.name[i]);
+    }
+    put(board_info, 0x10, 2, identity_.lbp_version);
+    put(board_info, 0x12, 2, identity_.firmware_version);
+    for (std::uint32_t i = 0; i < options_.mac.size(); ++i) memory_[eeprom][2 + i] = options_.mac[5 - i];
+    for (std::uint32_t i = 0; i < options_.address.size(); ++i) memory_[eeprom][0x20 + i] = options_.address[3 - i];
     power_on();
   }
-}
+  [[nodiscard]] static Access decoded(std::uint32_t command) noexcept {
+    return {.write = (command & 0x8000U) != 0,
+            .info = (command & 0x2000U) != 0,
+            .increment = (command & 0x80U) != 0,
+            .space = command >> 10U & 7U,
+            .unit_bytes = 1U << (command >> 8U & 3U),
+            .units = command & 0x7FU};
+  }
+  [[nodiscard]] bool takes(const Access& access) const noexcept {
+    if (access.space == lock_step && !options_.lock_step) return false;
+    if (access.info) return !access.write && access.unit_bytes == 2;
+    const SpaceFacts& facts = spaces[access.space];
+    const std::uint32_t any = access.space == flash ? 0x07U : facts.sizes & 0x0FU;
+    return (any & access.unit_bytes) != 0;
+  }
+  [[nodiscard]] std::uint32_t info_word(std::uint32_t space, std::uint32_t address) const noexcept {
+    const SpaceFacts& facts = spaces[space];
+    switch (address) {
+      case 0x00: return 0x5A00U + space;
+      case 0x02: return facts.sizes;
+      case 0x04: return facts.ranges;
+      case 0x06: return pointers_[space];
+      case 0x08:
+      case 0x0A:
+      case 0x0C:
+      case 0x0E:
+        return static_cast<std::uint8_t>(facts.name[address - 8]) |
+               static_cast<std::uint32_t>(static_cast<std::uint8_t>(facts.name[address - 7])) << 8U;
+      default: return 0;
+    }
+  }
+  [[nodiscard]] std::uint64_t read(const Access& access, std::uint32_t address) const noexcept {
+    if (access.info) return info_word(access.space, address);
+    if (access.space == hostmot2) return read32(address & 0xFFFCU);
+    if (access.space == flash) return address == flash_id_address ? flash_id : 0;
+    if (access.space == timers && address == 0) {
+      return static_cast<std::uint64_t>((time_ns() - power_on_ns_) / 1000) & 0xFFFFU;
+    }
+    if (access.space == lock_step) {
+      Memory time{};
+      for (std::uint32_t i = 0; i < 8; ++i) time[i] = static_cast<std::uint8_t>(time_ns() >> 8U * i);
+      return bytes(time, address, access.unit_bytes);
+    }
+    return bytes(memory_[access.space], address, access.unit_bytes);
+  }
+  void write(const Access& access, std::uint32_t address, std::uint64_t value) {
+    if (access.space == hostmot2) return write32(address & 0xFFFCU, static_cast<std::uint32_t>(value));
+    const bool read_only = access.space == board_info || access.space == flash || access.space == ethernet_chip;
+    const bool locked = access.space == eeprom && bytes(memory_[control], eeprom_enable, 2) != eeprom_key;
+    if (read_only || locked) return count_error(write_error);
+    put(access.space, address, access.unit_bytes, value);
+    if (access.space == eeprom) put(control, eeprom_enable, 2, 0);  // the key opens it for one write
+    if (access.space == control) write_control(address);
+    if (access.space == lock_step && address + access.unit_bytes == 8) {
+      advance_to(static_cast<std::int64_t>(std::min<std::uint64_t>(
+          bytes(memory_[lock_step], 0, 8), static_cast<std::uint64_t>(time_ns()) + 10'000'000'000U)));
+    }
+  }
+  void write_control(std::uint32_t address) {
+    if (address == reset_register && bytes(memory_[control], address, 2) != 0) {
+      power_cycle();
+    } else if (address == reload_register && bytes(memory_[control], address, 2) != 0) {
+      put(control, address, 2, 0);
+      power_on();
+    }
+  }
+  void count_error(std::uint32_t bit) {
+    memory_[control][0] = static_cast<std::uint8_t>(memory_[control][0] | bit);
+    bump(control, bit == parse_error ? error_counts : bit == memory_error ? error_counts + 2 : error_counts + 4);
+  }
+  void bump(std::uint32_t space, std::uint32_t address) noexcept {
+    put(space, address, 2, bytes(memory_[space], address, 2) + 1);
+  }
+  [[nodiscard]] static std::uint64_t bytes(const Memory& memory, std::uint32_t address, std::uint32_t count) noexcept {
+    std::uint64_t value = 0;
+    for (std::uint32_t i = count; i > 0; --i) {
+      const std::uint32_t place = address + i - 1;
+      value = value << 8U | (place < memory.size() ? memory[place] : 0U);
+    }
+    return value;
+  }
+  void put(std::uint32_t space, std::uint32_t address, std::uint32_t count, std::uint64_t value) noexcept {
+    for (std::uint32_t i = 0; i < count && address + i < memory_bytes; ++i) {
+      memory_[space][address + i] = static_cast<std::uint8_t>(value >> 8U * i);
+    }
+  }
+
+  std::array<Memory, space_count> memory_{};
+  std::array<std::uint32_t, space_count> pointers_{};
+  std::int64_t power_on_ns_{0};
+};
+
+}  // namespace
+
+std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options) { return std::make_unique<Hm2Board>(options); }
 
 }  // namespace abs_hil::emulator

@@ -1,12 +1,11 @@
 // Faults of the cable between a host and the emulated 7I92.
 
-#include "emulator/hm2_link.hpp"
-
 #include <algorithm>
 #include <array>
 #include <utility>
 
 #include "emulator/fault_text.hpp"
+#include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {
 

@@ -1,9 +1,8 @@
 // Faults of single registers of the emulated PCI card.
-#include "emulator/register_faults.hpp"
-
 #include <array>
 #include <optional>
 
+#include "emulator/card_model.hpp"
 #include "emulator/fault_text.hpp"
 
 namespace abs_hil::emulator {

@@ -2,6 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <optional>
+#include <random>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -88,6 +91,76 @@ class UdpBoard : public RigBehind {
   Hm2Options options_;
   OutputLog log_{};
   std::uint64_t writes_{0};
+};
+
+inline constexpr std::uint16_t hm2_port = 27181;
+inline constexpr std::size_t largest_hm2_answer = 1472;
+
+/// The Mesa 7I92T as a host sees it through UDP: LBP16 commands in a datagram, their answers in another one. Where the
+/// documents are silent this project chose: a command that the space does not take reads as zeros and counts as an
+/// error; a datagram that breaks off, or whose answer would not fit into a packet, is obeyed up to that command.
+///
+/// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
+/// advances the time by a write of all 8 bytes.
+/// Throws std::invalid_argument if an option is outside its range.
+[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options);
+
+/// The node of docs/node.md: the core of its firmware, and the simulated rig behind its pins. Takes plant, start speed,
+/// MAC, address, lock-step and channels from `options`. A name that begins with "7I92" makes it present itself as that
+/// board. Throws std::invalid_argument as UdpBoard does.
+[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const Hm2Options& options);
+
+/// A datagram to or from a host. `peer` stands for the host's address.
+struct Hm2Datagram {
+  std::vector<std::uint8_t> bytes{};
+  std::uint64_t peer{0};
+};
+
+/// The cable between host and board, with its faults. `set` takes the text of the control command `fault`.
+class Hm2Link {
+ public:
+  explicit Hm2Link(std::uint64_t seed) : random_(seed) {}
+
+  /// Sets a fault such as "loss=5". Throws std::invalid_argument with the valid faults.
+  void set(std::string_view text);
+  /// Pulls or plugs the cable. What was under way is lost.
+  void plug(bool in);
+  [[nodiscard]] bool plugged() const noexcept { return plugged_; }
+
+  /// True if the board receives the next request.
+  [[nodiscard]] bool request_arrives();
+  /// Takes the board's answer.
+  void send(Hm2Datagram answer, std::int64_t now_ns);
+  /// The answers that reach their hosts by now.
+  [[nodiscard]] std::vector<Hm2Datagram> take_due(std::int64_t now_ns);
+  /// When the next answer is due.
+  [[nodiscard]] std::optional<std::int64_t> next_due_ns() const noexcept;
+
+ private:
+  enum class Kind : std::uint8_t {
+    ok,             ///< heals all of them
+    loss,           ///< each datagram of both directions is lost with this probability
+    lose_requests,  ///< the next ones are lost, as many as the number says
+    lose_answers,
+    delay,      ///< every answer comes later
+    reorder,    ///< answers leave in pairs, the later one first
+    duplicate,  ///< every answer comes twice
+    stale,      ///< the answer before comes in place of each
+    too_short,  ///< answers end after so many bytes
+    garbage,    ///< every answer is random bytes of its length
+  };
+  struct Waiting {
+    std::int64_t due_ns{0};
+    Hm2Datagram answer{};
+  };
+  [[nodiscard]] bool lost(Kind counted);
+
+  bool plugged_{true};
+  Kind kind_{Kind::ok};
+  double number_{0.0};
+  std::optional<Hm2Datagram> kept_{};
+  std::vector<Waiting> waiting_{};
+  std::mt19937_64 random_;
 };
 
 }  // namespace abs_hil::emulator

@@ -228,8 +228,6 @@ void UsbipDevice::give_answers(std::int64_t now_ns, Bytes& replies) {
   }
 }
 
-void UsbipDevice::answer_late_ones(std::int64_t now_ns, Bytes& replies) { give_answers(now_ns, replies); }
-
 void UsbipDevice::reconnect() {
   received_.clear();
   waiting_.clear();

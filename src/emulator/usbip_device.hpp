@@ -35,8 +35,8 @@ class UsbipDevice {
   /// @param now_ns time on any monotonic clock, for late answers
   /// Throws std::runtime_error if the bytes are not a command of the protocol: the stream is lost.
   void receive(std::span<const std::uint8_t> bytes, std::int64_t now_ns, std::vector<std::uint8_t>& replies);
-  /// Appends the delayed answers that are due.
-  void answer_late_ones(std::int64_t now_ns, std::vector<std::uint8_t>& replies);
+  /// Appends the answers that are due.
+  void give_answers(std::int64_t now_ns, std::vector<std::uint8_t>& replies);
   /// Resets the state of the connection, like a board that is plugged in again. The outputs do not change.
   void reconnect();
   /// True if the host has configured the device.
@@ -68,7 +68,6 @@ class UsbipDevice {
   void unlink(std::uint32_t sequence, std::uint32_t unlinked, std::vector<std::uint8_t>& replies);
   void control(const Transfer& transfer, std::vector<std::uint8_t>& replies);
   void bulk_out(const Transfer& transfer, std::int64_t now_ns, std::vector<std::uint8_t>& replies);
-  void give_answers(std::int64_t now_ns, std::vector<std::uint8_t>& replies);
   [[nodiscard]] std::vector<std::uint8_t> descriptor(std::uint8_t type, std::uint8_t index) const;
 
   UsbBoardModel& board_;

@@ -9,13 +9,12 @@
 
 #include "../runtime/proofs/interposed.hpp"
 #include "catch.hpp"
-#include "driver/can/can_safe_state.hpp"
+#include "driver/can/can_driver.hpp"
 #include "driver/file_descriptor.hpp"
-#include "driver/hm2/hm2_safe_state.hpp"
+#include "driver/hm2/hm2_driver.hpp"
 #include "driver/own_handle_writer.hpp"
-#include "driver/pci/pci_safe_state.hpp"
-#include "driver/pci/register_map.hpp"
-#include "driver/usb/usb_safe_state.hpp"
+#include "driver/pci/pci_driver.hpp"
+#include "driver/usb/usb_driver.hpp"
 #include "emulator/can_node.hpp"
 #include "hm2/register_board.hpp"
 
@@ -143,54 +142,54 @@ struct HonestThenFixed final : hm2::Link {
 TEST_CASE("The hm2 writer, with a board that answers, that does not, and with none") {
   bool answers = true;
   HonestThenFixed* link = nullptr;
-  hm2::Hm2SafeState writer({}, [&] {
+  const auto writer = hm2::safe_state_writer({}, [&] {
     auto made = std::make_unique<HonestThenFixed>(answers);
     link = made.get();
     return made;
   });
-  writer.prepare();
+  writer->prepare();
   link->end_description();
-  CHECK(offences_of(writer) == 0);
-  CHECK(writer.verify_safe().ok());
+  CHECK(offences_of(*writer) == 0);
+  CHECK(writer->verify_safe().ok());
   answers = false;
-  CHECK(offences_of(writer) == 0);
-  CHECK(writer.make_safe().error == IoError::no_answer);
-  hm2::Hm2SafeState absent({}, []() -> std::unique_ptr<hm2::Link> { return nullptr; });
-  CHECK_FALSE(absent.make_safe().ok());
-  CHECK(offences_of(absent) == 0);
+  CHECK(offences_of(*writer) == 0);
+  CHECK(writer->make_safe().error == IoError::no_answer);
+  const auto absent = hm2::safe_state_writer({}, []() -> std::unique_ptr<hm2::Link> { return nullptr; });
+  CHECK_FALSE(absent->make_safe().ok());
+  CHECK(offences_of(*absent) == 0);
 }
 
 TEST_CASE("The PCI writer, with a card that answers, that does not, and with none") {
   bool answers = true;
-  pci::PciSafeState writer([&] { return std::make_unique<Widths>(answers); });
-  writer.prepare();
-  CHECK(offences_of(writer) == 0);
-  CHECK(writer.verify_safe().ok());
+  const auto writer = pci::safe_state_writer([&] { return std::make_unique<Widths>(answers); });
+  writer->prepare();
+  CHECK(offences_of(*writer) == 0);
+  CHECK(writer->verify_safe().ok());
   answers = false;
-  CHECK(offences_of(writer) == 0);
-  CHECK(writer.make_safe().error == IoError::no_answer);
-  pci::PciSafeState absent([] { return std::unique_ptr<pci::RegisterWindow>(); });
-  CHECK(offences_of(absent) == 0);
-  CHECK(absent.make_safe().error == IoError::disconnected);
-  CHECK_THROWS_AS(absent.prepare(), Unavailable);
+  CHECK(offences_of(*writer) == 0);
+  CHECK(writer->make_safe().error == IoError::no_answer);
+  const auto absent = pci::safe_state_writer([] { return std::unique_ptr<pci::RegisterWindow>(); });
+  CHECK(offences_of(*absent) == 0);
+  CHECK(absent->make_safe().error == IoError::disconnected);
+  CHECK_THROWS_AS(absent->prepare(), Unavailable);
 }
 
 TEST_CASE("The USB writer, with a board that answers, that does not, and with none") {
   bool answers = true;
-  usb::UsbSafeState writer({}, [&] {
+  const auto writer = usb::safe_state_writer({}, [&] {
     usb::Board board{};
     board.link = std::make_unique<Echo>(answers);
     return board;
   });
-  REQUIRE(writer.make_safe().ok());
-  CHECK(offences_of(writer) == 0);
-  CHECK(writer.verify_safe().ok());
+  REQUIRE(writer->make_safe().ok());
+  CHECK(offences_of(*writer) == 0);
+  CHECK(writer->verify_safe().ok());
   answers = false;
-  CHECK(offences_of(writer) == 0);
-  CHECK_FALSE(writer.make_safe().ok());
-  usb::UsbSafeState absent({}, [] { return usb::Board{}; });
-  CHECK(offences_of(absent) == 0);
-  CHECK(absent.make_safe().error == IoError::disconnected);
+  CHECK(offences_of(*writer) == 0);
+  CHECK_FALSE(writer->make_safe().ok());
+  const auto absent = usb::safe_state_writer({}, [] { return usb::Board{}; });
+  CHECK(offences_of(*absent) == 0);
+  CHECK(absent->make_safe().error == IoError::disconnected);
 }
 
 TEST_CASE("The CAN writer, with a node that answers, that does not, and with none") {
@@ -198,14 +197,15 @@ TEST_CASE("The CAN writer, with a node that answers, that does not, and with non
   std::array<int, 2> ends{};
   REQUIRE(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) == 0);
   const FileDescriptor other_end(ends[1]);
-  can::CanSafeState writer([&] { return can::Link{.socket = std::make_unique<Recorded>(ends[0], frames)}; }, false);
-  writer.prepare();
-  CHECK(offences_of(writer) == 0);
-  CHECK(offences_of(writer) == 0);  // the answers are used up
-  CHECK(writer.make_safe().error == IoError::no_answer);
-  can::CanSafeState absent([] { return can::Link{}; }, true);
-  CHECK(offences_of(absent) == 0);
-  CHECK(absent.make_safe().error == IoError::disconnected);
+  const auto writer =
+      can::safe_state_writer([&] { return can::Link{.socket = std::make_unique<Recorded>(ends[0], frames)}; }, false);
+  writer->prepare();
+  CHECK(offences_of(*writer) == 0);
+  CHECK(offences_of(*writer) == 0);  // the answers are used up
+  CHECK(writer->make_safe().error == IoError::no_answer);
+  const auto absent = can::safe_state_writer([] { return can::Link{}; }, true);
+  CHECK(offences_of(*absent) == 0);
+  CHECK(absent->make_safe().error == IoError::disconnected);
 }
 
 TEST_CASE("A board that is gone is looked for every 100 ms, and every 5 ms once its file is there again") {

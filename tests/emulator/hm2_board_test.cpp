@@ -13,7 +13,8 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 TEST_CASE("After power-on the watchdog has bitten, no pin is driven, all are pulled high") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   CHECK(read32(board, 0x0D00) == 1);
   CHECK(read32(board, 0x0C00) == 0x80000000);
   CHECK(read32(board, 0x1100) == 0);
@@ -22,12 +23,14 @@ TEST_CASE("After power-on the watchdog has bitten, no pin is driven, all are pul
   board.advance_to(1000 * ms);
   CHECK(board.outputs().drive_duty == 0.0);
   // The wrong wiring: pulled high is full PWM.
-  Hm2Board wrong({.active_high_stage = true});
+  const auto made_wrong = hm2_board({.active_high_stage = true});
+  UdpBoard& wrong = *made_wrong;
   CHECK(wrong.outputs().brake_duty == 1.0);
 }
 
 TEST_CASE("Duty = value / 4096, by inverted pins whose source is the generator; the E-stop cuts the drive only") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   activate(board);
   CHECK(board.outputs().brake_duty == 0.0);
   set_brake(board, 2866);
@@ -55,7 +58,8 @@ TEST_CASE("Duty = value / 4096, by inverted pins whose source is the generator; 
 }
 
 TEST_CASE("A pin's level, sampled over periods, has the duty and the frequency of ClockHigh rate / 65536 / 4096") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   activate(board);
   set_brake(board, 1000);
   write32(board, 0x0C00, 0x7FFFFFFF);
@@ -75,7 +79,8 @@ TEST_CASE("A pin's level, sampled over periods, has the duty and the frequency o
 }
 
 TEST_CASE("The watchdog bites N + 3 or 4 clocks after the load; a bite clears DDR and open drain, nothing else") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   activate(board);
   write32(board, 0x1300, 0x10);
   set_brake(board, 2000);
@@ -108,7 +113,8 @@ TEST_CASE("The watchdog bites N + 3 or 4 clocks after the load; a bite clears DD
 }
 
 TEST_CASE("Only the mark 5A reloads; switching the armed watchdog off, or loading 1, bites at once") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   activate(board);
   set_brake(board, 2000);
   board.advance_to(4 * ms);
@@ -134,7 +140,8 @@ TEST_CASE("Only the mark 5A reloads; switching the armed watchdog off, or loadin
 }
 
 TEST_CASE("Double buffering delays a value to the next period of 160 Hz; without it the value acts at once") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   activate(board, 0x23);
   write32(board, 0x0C00, 0x7FFFFFFF);
   const double period_ns = 1e9 * 65536.0 * 4096.0 / 200e6 / 214.0;
@@ -151,7 +158,8 @@ TEST_CASE("Double buffering delays a value to the next period of 160 Hz; without
 
 TEST_CASE("Counts wrap at 16 bits and are the encoder's; count and stamps give the speed to a part in 1000") {
   constexpr double speed = 100.0;
-  Hm2Board board({.start_speed_rad_s = speed});
+  const auto made_board = hm2_board({.start_speed_rad_s = speed});
+  UdpBoard& board = *made_board;
   write32(board, 0x3200, 48);
   const auto sample = [&board] { return ask(board, "814200338242003082420031"); };
   board.advance_to(1 * ms);
@@ -178,7 +186,8 @@ TEST_CASE("Counts wrap at 16 bits and are the encoder's; count and stamps give t
 }
 
 TEST_CASE("Hand-turned wheels count backwards; a write clears a counter; the error bit latches") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   board.turn_by_hand(true, -0.5);
   CHECK((read32(board, 0x3004) & 0xFFFF) == 0x10000 - 2048);
   CHECK((read32(board, 0x3000) & 0xFFFF) == 0);
@@ -202,7 +211,8 @@ TEST_CASE("Hand-turned wheels count backwards; a write clears a counter; the err
 
 TEST_CASE("A power cycle and a reset leave every register as at power-on; the wheels turn on") {
   for (const bool by_network : {false, true}) {
-    Hm2Board board({.start_speed_rad_s = 50.0});
+    const auto made_board = hm2_board({.start_speed_rad_s = 50.0});
+    UdpBoard& board = *made_board;
     const std::string fresh = board.registers_text();
     activate(board);
     set_brake(board, 2000);

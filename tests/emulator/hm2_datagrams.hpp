@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "emulator/hm2_board.hpp"
+#include "emulator/udp_board.hpp"
 
 namespace abs_hil::test {
 
-using emulator::Hm2Board;
+using emulator::UdpBoard;
 using Bytes = std::vector<std::uint8_t>;
 inline constexpr std::int64_t ms = 1'000'000;
 
@@ -30,23 +30,23 @@ inline std::uint64_t number(const Bytes& bytes, std::size_t at, std::size_t coun
   return value;
 }
 
-inline Bytes ask(Hm2Board& board, const std::string& text) { return board.answer(hex(text)); }
+inline Bytes ask(UdpBoard& board, const std::string& text) { return board.answer(hex(text)); }
 
-inline std::uint32_t read32(Hm2Board& board, unsigned address) {
+inline std::uint32_t read32(UdpBoard& board, unsigned address) {
   const Bytes answer =
       board.answer(Bytes{0x81, 0x42, static_cast<std::uint8_t>(address), static_cast<std::uint8_t>(address >> 8U)});
   REQUIRE(answer.size() == 4);
   return static_cast<std::uint32_t>(number(answer, 0, 4));
 }
 
-inline void write32(Hm2Board& board, unsigned address, std::uint32_t value) {
+inline void write32(UdpBoard& board, unsigned address, std::uint32_t value) {
   Bytes datagram{0x81, 0xC2, static_cast<std::uint8_t>(address), static_cast<std::uint8_t>(address >> 8U)};
   for (int i = 0; i < 4; ++i) datagram.push_back(static_cast<std::uint8_t>(value >> 8 * i));
   CHECK(board.answer(datagram).empty());
 }
 
 /// As a driver activates: values 0, mode, rate of 160 Hz, inversion, PWM pins, watchdog of 5 ms, DDR last.
-inline void activate(Hm2Board& board, std::uint32_t mode = 3) {
+inline void activate(UdpBoard& board, std::uint32_t mode = 3) {
   for (const unsigned i : {0U, 4U}) {
     write32(board, 0x4000 + i, 0);
     write32(board, 0x4100 + i, mode);
@@ -59,7 +59,7 @@ inline void activate(Hm2Board& board, std::uint32_t mode = 3) {
   for (const unsigned i : {0U, 4U}) write32(board, 0x1100 + i, 2);
 }
 
-inline void pet(Hm2Board& board) { write32(board, 0x0E00, 0x5A000000); }
-inline void set_brake(Hm2Board& board, std::uint32_t steps) { write32(board, 0x4004, steps << 16U); }
+inline void pet(UdpBoard& board) { write32(board, 0x0E00, 0x5A000000); }
+inline void set_brake(UdpBoard& board, std::uint32_t steps) { write32(board, 0x4004, steps << 16U); }
 
 }  // namespace abs_hil::test

@@ -1,8 +1,7 @@
 // The cable of the emulated 7I92T: which datagrams come through, when, and in which order.
 
-#include "emulator/hm2_link.hpp"
-
 #include "catch.hpp"
+#include "emulator/udp_board.hpp"
 
 using namespace abs_hil::emulator;
 using Catch::Matchers::Contains;

@@ -13,7 +13,8 @@ using namespace abs_hil::test;
 using Catch::Matchers::Contains;
 
 TEST_CASE("Spaces: name, versions, MAC, address, clock, scratch, packet counts, info areas, pointers") {
-  Hm2Board board({.name = "7I92", .mac = {0, 0x60, 0x1B, 1, 2, 3}, .address = {10, 10, 10, 10}});
+  const auto made_board = hm2_board({.name = "7I92", .mac = {0, 0x60, 0x1B, 1, 2, 3}, .address = {10, 10, 10, 10}});
+  UdpBoard& board = *made_board;
   CHECK(ask(board, "885D0000") == hex("37493932000000000000000000000000"));
   CHECK(ask(board, "835D1000") == hex("030011000000"));
   CHECK(ask(board, "83490200") == hex("0302011b6000"));
@@ -34,7 +35,8 @@ TEST_CASE("Spaces: name, versions, MAC, address, clock, scratch, packet counts, 
 
 TEST_CASE(
     "Commands that no space takes count as errors and read as zeros; broken datagrams are obeyed up to the break") {
-  Hm2Board board({});
+  const auto made_board = hm2_board({});
+  UdpBoard& board = *made_board;
   CHECK(ask(board, "81410001") == hex("0000"));              // HostMot2 by 16 bits
   CHECK(ask(board, "84550000") == hex("0000000000000000"));  // space 5
   CHECK(ask(board, "81DD0000FFFF").empty());                 // the name is read-only
@@ -55,7 +57,8 @@ TEST_CASE(
 }
 
 TEST_CASE("In lock-step only a write of all of space 5 advances the time") {
-  Hm2Board board({.lock_step = true});
+  const auto made_board = hm2_board({.lock_step = true});
+  UdpBoard& board = *made_board;
   CHECK(ask(board, "82D6000040420F0000000000").empty());
   CHECK(board.time_ns() == 1 * ms);
   CHECK(number(ask(board, "82560000"), 0, 8) == 1'000'000);
@@ -67,7 +70,7 @@ TEST_CASE("In lock-step only a write of all of space 5 advances the time") {
 }
 
 TEST_CASE("Each lie changes what the board says about itself; an unknown one is refused with all known ones") {
-  const auto says = [](Hm2Board& board) {
+  const auto says = [](UdpBoard& board) {
     Bytes all;
     for (const char* const part : {"FF420001", "FF42FC02", "FF42F804", "825D1000"}) {
       const Bytes answer = ask(board, part);
@@ -75,25 +78,29 @@ TEST_CASE("Each lie changes what the board says about itself; an unknown one is 
     }
     return all;
   };
-  Hm2Board truthful({});
+  const auto made_truthful = hm2_board({});
+  UdpBoard& truthful = *made_truthful;
   std::istringstream names(Hm2Identity::lies());
   std::vector<Bytes> told{says(truthful)};
   for (std::string name; names >> name;) {
     INFO(name);
-    Hm2Board liar({.lie = name});
+    const auto made_liar = hm2_board({.lie = name});
+    UdpBoard& liar = *made_liar;
     CHECK(std::find(told.begin(), told.end(), says(liar)) == told.end());
     told.push_back(says(liar));
   }
   CHECK(told.size() == 23);
-  CHECK_THROWS_WITH(Hm2Board({.lie = "honest"}), Contains("honest") && Contains("255-instances"));
-  CHECK_THROWS_WITH(Hm2Board({.name = ""}), Contains("1 to 16 characters"));
-  CHECK_THROWS_WITH(Hm2Board({.drive_pwm = 1}), Contains("PWM generators 1 and 1"));
-  CHECK_THROWS_WITH(Hm2Board({.enable_pin = 34}), Contains("-1 to 33"));
+  CHECK_THROWS_WITH(hm2_board({.lie = "honest"}), Contains("honest") && Contains("255-instances"));
+  CHECK_THROWS_WITH(hm2_board({.name = ""}), Contains("1 to 16 characters"));
+  CHECK_THROWS_WITH(hm2_board({.drive_pwm = 1}), Contains("PWM generators 1 and 1"));
+  CHECK_THROWS_WITH(hm2_board({.enable_pin = 34}), Contains("-1 to 33"));
 }
 
 TEST_CASE("Any datagram is answered within a packet, and two boards answer the same") {
-  Hm2Board one({});
-  Hm2Board two({});
+  const auto made_one = hm2_board({});
+  UdpBoard& one = *made_one;
+  const auto made_two = hm2_board({});
+  UdpBoard& two = *made_two;
   std::mt19937 random(7);
   for (int n = 0; n < 50'000; ++n) {
     Bytes datagram(random() % 60);
@@ -101,7 +108,7 @@ TEST_CASE("Any datagram is answered within a packet, and two boards answer the s
     one.advance_to(n * std::int64_t{20'000});
     two.advance_to(n * std::int64_t{20'000});
     const Bytes answer = one.answer(datagram);
-    if (answer.size() > Hm2Board::largest_answer || answer != two.answer(datagram)) FAIL("datagram " << n);
+    if (answer.size() > largest_hm2_answer || answer != two.answer(datagram)) FAIL("datagram " << n);
   }
   CHECK(one.registers_text() == two.registers_text());
 }
@@ -110,7 +117,8 @@ TEST_CASE("LinuxCNC's recorded datagrams get the recorded answers, but for level
   // Recorded with another emulator of a 7I92, whose wheels, clock and open pins were other ones.
   std::ifstream file(ABS_HIL_HM2_FRAMES);
   REQUIRE(file);
-  Hm2Board board({.name = "7I92", .mac = {0, 0, 0x1B, 0x60, 0x3B, 0x10}});
+  const auto made_board = hm2_board({.name = "7I92", .mac = {0, 0, 0x1B, 0x60, 0x3B, 0x10}});
+  UdpBoard& board = *made_board;
   int compared = 0;
   double last_write_s = 0.0;
   std::uint64_t packets_left_out = 0;  // of the recording, where it says "..."

@@ -1,11 +1,9 @@
 // The emulated node beside the emulated 7I92T: two parties that share no line, given the same datagrams.
 
-#include "emulator/node_board.hpp"
-
 #include <cmath>
 
 #include "catch.hpp"
-#include "emulator/hm2_board.hpp"
+#include "emulator/udp_board.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::emulator;
@@ -34,8 +32,10 @@ const Bytes command = hex("82C20040 00000004 0000320B 81C2000E 0000005A");
 }  // namespace
 
 TEST_CASE("Node and 7I92T: the same activation and command, the same duties, zero after the same time") {
-  Hm2Board hm2({});
-  NodeBoard node({.name = "abs-node"});
+  const auto made_hm2 = hm2_board({});
+  UdpBoard& hm2 = *made_hm2;
+  const auto made_node = node_board({.name = "abs-node"});
+  UdpBoard& node = *made_node;
   for (UdpBoard* const board : std::initializer_list<UdpBoard*>{&hm2, &node}) {
     CHECK(board->bitten());
     CHECK(board->answer(activation).empty());
@@ -67,8 +67,10 @@ TEST_CASE("Node and 7I92T: the same activation and command, the same duties, zer
 }
 
 TEST_CASE("The node counts as the 7I92T does, forwards and backwards, from power-on") {
-  Hm2Board hm2({.start_speed_rad_s = 120.0});
-  NodeBoard node({.start_speed_rad_s = 120.0, .name = "abs-node"});
+  const auto made_hm2 = hm2_board({.start_speed_rad_s = 120.0});
+  UdpBoard& hm2 = *made_hm2;
+  const auto made_node = node_board({.start_speed_rad_s = 120.0, .name = "abs-node"});
+  UdpBoard& node = *made_node;
   for (int n = 1; n <= 50; ++n) {
     hm2.advance_to(n * ms);
     node.advance_to(n * ms);
@@ -82,16 +84,18 @@ TEST_CASE("The node counts as the 7I92T does, forwards and backwards, from power
 }
 
 TEST_CASE("In lock-step the host advances the node's time, alone or before other commands; hardware has no space 5") {
-  NodeBoard node({.lock_step = true});
+  const auto made_node = node_board({.lock_step = true});
+  UdpBoard& node = *made_node;
   CHECK(node.answer(hex("82D60000 40420F0000000000")).empty());
   CHECK(node.time_ns() == 1 * ms);
   CHECK(node.answer(hex("82560000")) == hex("40420F0000000000"));
   CHECK(node.answer(hex("01750000")) == hex("055A"));
   CHECK(node.answer(hex("82D60000 80841E0000000000 01510000")) == hex("D007"));
   CHECK(node.answer(hex("01510000 82560000 01750000 01510000")) == hex("D007 80841E0000000000 055A D007"));
-  NodeBoard real({});
+  const auto made_real = node_board({});
+  UdpBoard& real = *made_real;
   CHECK(real.answer(hex("82560000")) == Bytes(8, 0));
   CHECK(real.answer(hex("01750000")) == Bytes(2, 0));
   CHECK(real.time_ns() == 0);
-  CHECK_THROWS_WITH(NodeBoard({.name = ""}), Contains("1 to 16"));
+  CHECK_THROWS_WITH(node_board({.name = ""}), Contains("1 to 16"));
 }

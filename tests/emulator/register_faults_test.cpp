@@ -1,10 +1,9 @@
 // Faults of the emulated card's registers: each does what its name says.
-#include "emulator/register_faults.hpp"
-
 #include <set>
 #include <stdexcept>
 
 #include "catch.hpp"
+#include "emulator/card_model.hpp"
 
 using namespace abs_hil::emulator;
 

@@ -54,7 +54,7 @@ struct Host {
   }
   Bytes late() {
     Bytes replies;
-    device.answer_late_ones(now_ns, replies);
+    device.give_answers(now_ns, replies);
     return replies;
   }
   Bytes ask(std::uint32_t sequence) { return send(submit(sequence, false, 2, 4, {}, request)); }

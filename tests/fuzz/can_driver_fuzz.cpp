@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "driver/can/answer_tracker.hpp"
 #include "driver/can/bus.hpp"
+#include "driver/can/can_driver.hpp"
 #include "driver/can/protocol.hpp"
 #include "fuzz_input.hpp"
 

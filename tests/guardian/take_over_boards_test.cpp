@@ -2,10 +2,8 @@
 // board: the owner drives and falls silent; the writer brings drive and brake to 0 and releases the board.
 
 #include "catch.hpp"
-#include "driver/can/can_safe_state.hpp"
 #include "driver/can/node_on_socket.hpp"
 #include "driver/usb/model_board.hpp"
-#include "driver/usb/usb_safe_state.hpp"
 
 using namespace abs_hil;
 
@@ -37,13 +35,13 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
       drive(owner, command);
       CHECK(node.wire().drive_duty + node.wire().brake_duty > 0.4);
 
-      driver::can::CanSafeState writer(node.opener(can_fd), true);
-      writer.prepare();
+      const auto writer = driver::can::safe_state_writer(node.opener(can_fd), true);
+      writer->prepare();
       CHECK(node.wire().drive_duty + node.wire().brake_duty > 0.4);  // nothing is written beside an owner
-      CHECK(writer.make_safe().ok());
+      CHECK(writer->make_safe().ok());
       CHECK(node.wire().drive_duty == 0.0);
       CHECK(node.wire().brake_duty == 0.0);
-      CHECK(writer.make_safe().ok());  // may be repeated
+      CHECK(writer->make_safe().ok());  // may be repeated
     }
   }
 }
@@ -52,12 +50,12 @@ TEST_CASE("a CAN node counts as safe only once it answers") {
   test::NodeOnSocket node({.start_speed_rad_s = 30.0});
   driver::can::CanDriver owner(driver::can::CanOptions{.answer_timeout_us = 8'000}, node.opener(), true);
   drive(owner, driving);
-  driver::can::CanSafeState writer(node.opener(), true);
-  writer.prepare();
+  const auto writer = driver::can::safe_state_writer(node.opener(), true);
+  writer->prepare();
   node.fault("silent");
-  CHECK_FALSE(writer.make_safe().ok());
+  CHECK_FALSE(writer->make_safe().ok());
   node.fault("ok");
-  CHECK(writer.make_safe().ok());
+  CHECK(writer->make_safe().ok());
   CHECK(node.wire().drive_duty == 0.0);
 }
 
@@ -69,14 +67,14 @@ TEST_CASE("a USB board whose owner fell silent is taken over and left safe") {
     const auto acting = [&board] { return board.model.outputs().drive_duty + board.model.outputs().brake_duty; };
     CHECK(acting() > 0.4);
 
-    driver::usb::UsbSafeState writer(driver::usb::UsbOptions{}, board.opener());
-    writer.prepare();
+    const auto writer = driver::usb::safe_state_writer(driver::usb::UsbOptions{}, board.opener());
+    writer->prepare();
     CHECK(acting() > 0.4);
     board.unplugged = true;
-    CHECK_FALSE(writer.make_safe().ok());
+    CHECK_FALSE(writer->make_safe().ok());
     board.unplugged = false;
-    CHECK(writer.make_safe().ok());
+    CHECK(writer->make_safe().ok());
     CHECK(acting() == 0.0);
-    CHECK(writer.make_safe().ok());
+    CHECK(writer->make_safe().ok());
   }
 }

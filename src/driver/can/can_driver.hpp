@@ -9,7 +9,6 @@
 
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
-#include "driver/can/answer_tracker.hpp"
 #include "driver/can/bus.hpp"
 #include "driver/pwm.hpp"
 
@@ -19,6 +18,91 @@ namespace abs_hil::driver::can {
 [[nodiscard]] inline OutputGrid output_grid(const CanOptions& options) noexcept {
   return {.duty_steps = duty_steps, .motor_duty_max = options.motor_duty_max, .brake_duty_max = options.brake_duty_max};
 }
+
+/// What is wrong with a frame or a cycle. The larger the number, the more it tells about the cause.
+enum class Anomaly : std::uint8_t {
+  none = 0,
+  missing,       ///< no answer in time
+  queue_full,    ///< the SYNC or the command could not be sent
+  stale,         ///< an answer to an earlier SYNC
+  out_of_order,  ///< a sequence ahead of the SYNC, or the answer's two frames in the wrong order
+  duplicate,     ///< the same frame again
+  too_many,      ///< more frames than a cycle reads, or frames that the kernel dropped
+  implausible,   ///< a signal out of its range
+  forged,        ///< a frame with the node's identifier and a wrong checksum
+  wrong_length,
+};
+
+/// The node's counters, clock and state at one SYNC.
+struct Answer {
+  Values values{};
+  unsigned count_bits{24};  ///< width of the wheels' counters
+};
+
+/// Assembles the answer to one SYNC from its frames and finds frames that do not belong to it. Real-time safe.
+class AnswerTracker {
+ public:
+  /// Starts anew before the first SYNC; `sequence` is the sequence before it.
+  void reset(std::uint8_t sequence) noexcept {
+    *this = {};
+    expected_ = last_ = sequence;
+  }
+  /// Expects the answer to a SYNC that was sent with this sequence.
+  void expect(std::uint8_t sequence) noexcept {
+    expected_ = sequence;
+    has_encoders_ = has_latch_ = false;
+    answer_ = {};
+  }
+
+  /// Takes ABS_ENCODERS, ABS_LATCH or ABS_MEASUREMENT.
+  Anomaly take(std::uint32_t identifier, const Values& values) noexcept {
+    if (const Anomaly anomaly = place(values.sequence); anomaly != Anomaly::none) return anomaly;
+    const bool encoders = identifier != id::latch;
+    const bool latch = identifier != id::encoders;
+    if ((encoders && has_encoders_) || (latch && has_latch_)) return Anomaly::duplicate;
+    // The latch should have come last. The answer is still valid.
+    const Anomaly anomaly = encoders && has_latch_ ? Anomaly::out_of_order : Anomaly::none;
+    if (encoders) {
+      answer_.values.upper_counts = values.upper_counts;
+      answer_.values.lower_counts = values.lower_counts;
+      answer_.count_bits = latch ? 32 : 24;
+      has_encoders_ = true;
+    }
+    if (latch) {
+      answer_.values.lever_counts = values.lever_counts;
+      answer_.values.node_time_us = values.node_time_us;
+      answer_.values.node_state = values.node_state;
+      has_latch_ = true;
+    }
+    if (complete()) {
+      last_ = expected_;
+      any_ = true;
+    }
+    return anomaly;
+  }
+
+  /// `none` if a frame with this sequence belongs to the expected SYNC.
+  [[nodiscard]] Anomaly place(std::int64_t sequence) const noexcept {
+    constexpr std::uint8_t half = 128;
+    const auto behind = static_cast<std::uint8_t>(expected_ - sequence);
+    if (behind == 0) return Anomaly::none;
+    if (behind >= half) return Anomaly::out_of_order;
+    return any_ && sequence == last_ ? Anomaly::duplicate : Anomaly::stale;
+  }
+  [[nodiscard]] bool complete() const noexcept { return has_encoders_ && has_latch_; }
+  /// The answer to the expected SYNC; valid once complete.
+  [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
+  /// Sequence of the last complete answer.
+  [[nodiscard]] std::uint8_t last_sequence() const noexcept { return last_; }
+
+ private:
+  std::uint8_t expected_{0};
+  std::uint8_t last_{0};
+  bool any_{false};  ///< `last_` is the sequence of an answer
+  bool has_encoders_{false};
+  bool has_latch_{false};
+  Answer answer_{};
+};
 
 inline constexpr std::int64_t handshake_timeout_ns = 100'000'000;
 inline constexpr int handshake_attempts = 3;
@@ -43,6 +127,8 @@ struct CanCounters {
   std::int64_t longest_answer_ns{0};
 };
 
+using OpenLink = std::function<Link()>;
+
 /// The rig behind a CAN I/O node (docs/can.md). Not verified on hardware.
 ///
 /// One cycle: `read` sends ABS_SYNC and waits for the answer, at most `driver.can.answer_timeout_us`; `write` sends
@@ -51,12 +137,11 @@ struct CanCounters {
 /// `write` with its own reason. Without commands the node's watchdog zeroes the outputs.
 class CanDriver final : public BoardDriver {
  public:
-  using OpenLink = std::function<Link()>;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link  called by `configure`; throws Unavailable
   /// @param lock_step  this driver advances the time of the node, which must be an emulator in lock-step
   CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step);
-  ~CanDriver() override;
+  ~CanDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
@@ -136,8 +221,8 @@ class CanDriver final : public BoardDriver {
 
   // Last values from the node.
   bool any_answer_{false};
-  std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
-  std::array<std::int32_t, 2> counts_{};      ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
+  std::array<std::uint32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
+  std::array<std::int32_t, 2> counts_{};       ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
   std::int64_t node_time_us_{0};
   std::int64_t latched_ns_{0};
   double supply_V_{rig::unknown};
@@ -154,5 +239,13 @@ class CanDriver final : public BoardDriver {
   Duties applied_{};
   std::uint8_t applied_sequence_{0};
 };
+
+/// Makes the writer of a CAN node's safe state: it sends the request to deactivate, and zeros, without any handshake,
+/// and waits afterwards until the node reports that it is inactive with both outputs 0. A bus takes more than one
+/// socket, so this one is open beside the owner's. An emulator's socket takes one peer only, so it is opened after the
+/// owner's end.
+/// @param open_link  does not wait
+/// @param one_peer   the link takes one peer only
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(OpenLink open_link, bool one_peer);
 
 }  // namespace abs_hil::driver::can

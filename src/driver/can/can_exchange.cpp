@@ -1,7 +1,6 @@
 // One cycle of the driver: send the SYNC, receive the answer, check it.
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -21,13 +20,6 @@ constexpr int most_answers_without = 50;
 /// Largest difference between the node's clock and ours over one interval. The node may answer at any time within the
 /// timeout.
 constexpr std::int64_t clock_slack_ns = 10'000'000;
-
-/// Counts travelled between two readings of a counter that has `bits` bits.
-std::int32_t travelled(std::int32_t before, std::int32_t after, unsigned bits) noexcept {
-  const unsigned unused = 32U - bits;
-  const std::uint32_t difference = std::bit_cast<std::uint32_t>(after) - std::bit_cast<std::uint32_t>(before);
-  return std::bit_cast<std::int32_t>(difference << unused) >> unused;
-}
 
 /// What a lost cycle is called that an anomaly caused, and what counts it.
 struct AnomalyFacts {
@@ -171,8 +163,8 @@ IoResult CanDriver::tripped() noexcept {
 }
 
 bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept {
-  const std::array<std::int32_t, 2> raw{static_cast<std::int32_t>(answer.values.upper_counts),
-                                        static_cast<std::int32_t>(answer.values.lower_counts)};
+  const std::array<std::uint32_t, 2> raw{static_cast<std::uint32_t>(answer.values.upper_counts),
+                                         static_cast<std::uint32_t>(answer.values.lower_counts)};
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
   for (std::size_t wheel = 0; wheel < raw.size(); ++wheel) {
     const std::int32_t moved = travelled(raw_counts_[wheel], raw[wheel], answer.count_bits);

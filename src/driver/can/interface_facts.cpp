@@ -1,6 +1,4 @@
 // Asks rtnetlink for the CAN interfaces and reads its answers.
-#include "driver/can/interface_facts.hpp"
-
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
@@ -15,7 +13,7 @@
 #include <functional>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/file_descriptor.hpp"
+#include "driver/can/bus.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -52,15 +50,10 @@ std::string text_of(const void* data, std::size_t size) {
 }
 
 std::string state_name(std::uint32_t state) {
-  switch (state) {
-    case CAN_STATE_ERROR_ACTIVE: return "error-active";
-    case CAN_STATE_ERROR_WARNING: return "error-warning";
-    case CAN_STATE_ERROR_PASSIVE: return "error-passive";
-    case CAN_STATE_BUS_OFF: return "bus-off";
-    case CAN_STATE_STOPPED: return "stopped";
-    case CAN_STATE_SLEEPING: return "sleeping";
-    default: return "unknown";
-  }
+  constexpr std::array<const char*, 6> names{"error-active", "error-warning", "error-passive",
+                                             "bus-off",      "stopped",       "sleeping"};
+  static_assert(CAN_STATE_SLEEPING + 1 == names.size());
+  return state < names.size() ? names[state] : "unknown";
 }
 
 void read_controller(InterfaceFacts& facts, const void* data, std::size_t size) {

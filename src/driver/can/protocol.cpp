@@ -2,6 +2,7 @@
 #include "driver/can/protocol.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace abs_hil::driver::can {
@@ -90,6 +91,16 @@ constexpr std::array table{
 
 constexpr unsigned bits_per_byte = 8;
 
+std::uint64_t mask_of(const Signal& signal) noexcept { return (std::uint64_t{1} << signal.bits) - 1U; }
+
+/// From the one in which the signal begins; it ends in them. Little-endian, as the signals and every machine that this
+/// is built for.
+std::uint64_t eight_bytes(const Frame& frame, const Signal& signal) noexcept {
+  std::uint64_t bytes = 0;
+  std::memcpy(&bytes, &frame.data[signal.start_bit / bits_per_byte], sizeof bytes);
+  return bytes;
+}
+
 double physical_or_nan(std::int64_t raw, double scale, std::int64_t unknown) noexcept {
   return raw == unknown ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(raw) * scale;
 }
@@ -111,25 +122,17 @@ const Message* find_message(std::uint32_t identifier) noexcept {
 }
 
 std::int64_t raw_value(const Frame& frame, const Signal& signal) noexcept {
-  std::uint64_t raw = 0;
-  for (unsigned number = 0; number < signal.bits; ++number) {
-    const unsigned place = signal.start_bit + number;
-    const std::uint64_t bit = (frame.data[place / bits_per_byte] >> (place % bits_per_byte)) & 1U;
-    raw |= bit << number;
-  }
+  std::uint64_t raw = eight_bytes(frame, signal) >> (signal.start_bit % bits_per_byte) & mask_of(signal);
   const std::uint64_t sign_bit = std::uint64_t{1} << (signal.bits - 1U);
-  if (signal.is_signed && (raw & sign_bit) != 0) raw |= ~((sign_bit << 1U) - 1U);
+  if (signal.is_signed && (raw & sign_bit) != 0) raw |= ~mask_of(signal);
   return static_cast<std::int64_t>(raw);
 }
 
 void set_raw_value(Frame& frame, const Signal& signal, std::int64_t raw) noexcept {
-  const auto bits = static_cast<std::uint64_t>(raw);
-  for (unsigned number = 0; number < signal.bits; ++number) {
-    const unsigned place = signal.start_bit + number;
-    std::uint8_t& byte = frame.data[place / bits_per_byte];
-    const auto mask = static_cast<std::uint8_t>(1U << (place % bits_per_byte));
-    byte = static_cast<std::uint8_t>(((bits >> number) & 1U) != 0 ? byte | mask : byte & ~mask);
-  }
+  const unsigned shift = signal.start_bit % bits_per_byte;
+  const std::uint64_t others = eight_bytes(frame, signal) & ~(mask_of(signal) << shift);
+  const std::uint64_t bytes = others | (static_cast<std::uint64_t>(raw) & mask_of(signal)) << shift;
+  std::memcpy(&frame.data[signal.start_bit / bits_per_byte], &bytes, sizeof bytes);
 }
 
 std::int64_t least_raw(const Signal& signal) noexcept { return std::llround(signal.least / signal.scale); }

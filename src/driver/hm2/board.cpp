@@ -1,7 +1,5 @@
 // Reads a board's description of itself, refuses what cannot be true, and finds the pins that the rig uses.
 
-#include "driver/hm2/board.hpp"
-
 #include <algorithm>
 #include <array>
 #include <initializer_list>
@@ -9,6 +7,7 @@
 #include <tuple>
 
 #include "driver/board_kit.hpp"
+#include "driver/hm2/wire.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -47,7 +46,6 @@ const std::array<Known, 4>& known_modules() {
 class Reader {
  public:
   Reader(Link& link, const std::string& place, std::uint32_t& number) : link_(link), place_(place), number_(number) {}
-
   Board read() {
     const auto id = words(at::cookie, 4);
     if (id[0] != cookie_value) refuse(formatted("its cookie is 0x%08x, not 0x%08x", id[0], cookie_value));
@@ -158,46 +156,41 @@ class Reader {
 
   void take_module(const Known& known, const std::vector<std::uint32_t>& word, const Strides& instance_strides,
                    const Strides& register_strides) {
+    const auto require = [&](bool possible, const std::string& fact) {
+      if (!possible) refuse(formatted("its %s module ", known.name) + fact);
+    };
     Module& module = board_.*known.place;
     if (module.instances != 0) refuse(formatted("it describes its %s module twice", known.name));
     const unsigned instances = word[0] >> 24U;
     const unsigned registers = (word[1] >> 16U) & 0xFFU;
     const unsigned strides = word[1] >> 24U;  // register stride in the low four bits, instance stride above
-    module.version = (word[0] >> 8U) & 0xFFU;
-    if (std::ranges::find(known.versions, module.version) == known.versions.end()) {
-      refuse(formatted("its %s module has the unknown version %u", known.name, module.version));
-    }
-    if (registers != known.registers || word[2] != known.multiple) {
-      refuse(formatted("its %s module has %u registers, bitmap 0x%x, not %u and 0x%x", known.name, registers, word[2],
-                       known.registers, known.multiple));
-    }
-    if (instances < 1 || instances > most_instances) {
-      refuse(
-          formatted("its %s module claims %u instances: 1 to %u are possible", known.name, instances, most_instances));
-    }
+    const unsigned version = (word[0] >> 8U) & 0xFFU;
+    require(std::ranges::find(known.versions, version) != known.versions.end(),
+            formatted("has the unknown version %u", version));
+    require(registers == known.registers && word[2] == known.multiple,
+            formatted("has %u registers, bitmap 0x%x, not %u and 0x%x", registers, word[2], known.registers,
+                      known.multiple));
+    require(instances >= 1 && instances <= most_instances,
+            formatted("claims %u instances: 1 to %u are possible", instances, most_instances));
     const unsigned clock = (word[0] >> 16U) & 0xFFU;
-    if ((clock != 1 && clock != 2) || (strides & 0xFU) > 1 || strides >> 4U > 1) {
-      refuse(
-          formatted("its %s module names clock %u and strides 0x%02x, which do not exist", known.name, clock, strides));
-    }
+    require((clock == 1 || clock == 2) && (strides & 0xFU) <= 1 && strides >> 4U <= 1,
+            formatted("names clock %u and strides 0x%02x, which do not exist", clock, strides));
     const std::uint32_t base = word[1] & 0xFFFFU;
     const std::uint32_t register_stride = register_strides[strides & 0xFU];
     const std::uint32_t instance_stride = instance_strides[strides >> 4U];
     const std::uint64_t last =
         base + std::uint64_t{registers - 1} * register_stride + std::uint64_t{instances - 1} * instance_stride;
     const bool apart = register_stride >= std::uint64_t{instances} * instance_stride || known.multiple == 0;
-    if (base < first_base || last + 4 > end_of_space || base % 4 != 0 || register_stride % 4 != 0 ||
-        instance_stride % 4 != 0 || register_stride == 0 || instance_stride == 0 || !apart) {
-      refuse(
-          formatted("its %s module has base 0x%x, register stride %u, instance stride %u: outside its space 0x%x to "
-                    "0x%x, or upon each other",
-                    known.name, base, register_stride, instance_stride, first_base, end_of_space - 1));
-    }
-    module.instances = instances;
-    module.base = static_cast<std::uint16_t>(base);
-    module.register_stride = static_cast<std::uint16_t>(register_stride);
-    module.instance_stride = static_cast<std::uint16_t>(instance_stride);
-    module.clock_Hz = clock == 1 ? board_.clock_low_Hz : board_.clock_high_Hz;
+    require(base >= first_base && last + 4 <= end_of_space && base % 4 == 0 && register_stride % 4 == 0 &&
+                instance_stride % 4 == 0 && register_stride != 0 && instance_stride != 0 && apart,
+            formatted("has base 0x%x, register stride %u, instance stride %u: outside its space 0x%x to 0x%x, or upon "
+                      "each other",
+                      base, register_stride, instance_stride, first_base, end_of_space - 1));
+    module = {.instances = instances,
+              .base = static_cast<std::uint16_t>(base),
+              .register_stride = static_cast<std::uint16_t>(register_stride),
+              .instance_stride = static_cast<std::uint16_t>(instance_stride),
+              .clock_Hz = clock == 1 ? board_.clock_low_Hz : board_.clock_high_Hz};
   }
 
   void require_registers_apart() const {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -12,12 +11,6 @@
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::hm2 {
-
-namespace {
-
-constexpr unsigned value_shift = 16;  // of a PWM's value register
-
-}  // namespace
 
 bool Hm2Driver::await_answer(std::int64_t deadline_ns, CycleAnswer& answer) noexcept {
   std::array<std::uint8_t, 256> bytes{};
@@ -120,13 +113,14 @@ std::int32_t Hm2Driver::edge_age_ns(const CycleAnswer& answer, std::size_t wheel
                                     std::int32_t before_ns) const noexcept {
   constexpr double wrap_ticks = 65536.0;
   const auto stamp = static_cast<std::uint16_t>(answer.count[wheel] >> 16U);
+  const bool same_stamp = stamp == raw_counts_[wheel] >> 16U;
   if (!moved) {
     // An edge to and fro: which of the two was last is not known.
-    if (stamp != stamps_[wheel] || before_ns < 0) return rig::no_edge_age;
+    if (!same_stamp || before_ns < 0) return rig::no_edge_age;
     const std::int64_t age_ns = before_ns + since_ns;
     return age_ns <= std::numeric_limits<std::int32_t>::max() ? static_cast<std::int32_t>(age_ns) : rig::no_edge_age;
   }
-  if (stamp == stamps_[wheel]) return rig::no_edge_age;  // a board without stamps
+  if (same_stamp) return rig::no_edge_age;  // a board without stamps
   if (!any_answer_ || static_cast<double>(since_ns) >= wrap_ticks * stamp_tick_ns_) return rig::no_edge_age;
   const auto ticks = static_cast<std::uint16_t>(answer.stamp_clock - stamp);
   return static_cast<std::int32_t>(std::lround(ticks * stamp_tick_ns_));
@@ -136,8 +130,7 @@ IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns)
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
   std::array<std::int32_t, 2> moved{};
   for (std::size_t wheel = 0; wheel < 2 && any_answer_; ++wheel) {
-    const auto step = static_cast<std::uint16_t>(static_cast<std::uint16_t>(answer.count[wheel]) - raw_counts_[wheel]);
-    moved[wheel] = std::bit_cast<std::int16_t>(step) * signs[wheel];
+    moved[wheel] = travelled(raw_counts_[wheel], answer.count[wheel], 16) * signs[wheel];
     if (!plausible_travel(0, moved[wheel], time_ns - last_.time_ns, options_)) {
       return {IoError::implausible_answer, wire_.count[wheel], 0, rig::Reason::hm2_values_implausible};
     }
@@ -148,10 +141,7 @@ IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns)
   last_.upper_edge_age_ns = edge_age_ns(answer, 0, moved[0] != 0, since_ns, last_.upper_edge_age_ns);
   last_.lower_edge_age_ns = edge_age_ns(answer, 1, moved[1] != 0, since_ns, last_.lower_edge_age_ns);
   last_.time_ns = time_ns;
-  for (std::size_t wheel = 0; wheel < 2; ++wheel) {
-    raw_counts_[wheel] = static_cast<std::uint16_t>(answer.count[wheel]);
-    stamps_[wheel] = static_cast<std::uint16_t>(answer.count[wheel] >> 16U);
-  }
+  raw_counts_ = answer.count;
   clock_us_ = answer.clock_us;
   any_answer_ = true;
   return {};
@@ -201,6 +191,7 @@ IoResult Hm2Driver::do_write(const rig::Command& command, rig::Command& sent) no
     return {};
   }
   const bool sets_up = !driving_ && at_rest_;
+  constexpr unsigned value_shift = 16;  // of a PWM's value register
   const rig::Command out = sets_up ? rig::safe_command : grid_.as_sent(command);
   ++write_number_;
   Packet packet;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The driver of a HostMot2 board: its lifecycle (hm2_driver.cpp) and its cycle (hm2_cycle.cpp).
+// The driver of a HostMot2 board: its lifecycle and texts (hm2_driver.cpp), its cycle (hm2_cycle.cpp).
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include "abs_hil/driver/backend.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
-#include "driver/hm2/board.hpp"
+#include "driver/hm2/wire.hpp"
 
 namespace abs_hil::driver::hm2 {
 
@@ -49,7 +49,7 @@ class Hm2Driver final : public BoardDriver {
   /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
   /// @param lock_step   this driver advances the time of the board, which must be an emulator in lock-step
   Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock = nullptr, bool lock_step = false);
-  ~Hm2Driver() override;
+  ~Hm2Driver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "hm2"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
@@ -148,11 +148,16 @@ class Hm2Driver final : public BoardDriver {
   std::uint32_t missing_{0};      ///< of those, how many the board has not received; they may still come
   int answers_since_missing_{0};
   std::uint16_t clock_us_{0};
-  std::array<std::uint16_t, 2> raw_counts_{};
-  std::array<std::uint16_t, 2> stamps_{};  ///< of the last edges, by the board's clock for them
+  std::array<std::uint32_t, 2> raw_counts_{};  ///< as CycleAnswer has them
   rig::Measurement last_{};
   LossBucket bucket_{2, 1, 20};  ///< trips at the tenth loss in a row
   Counters counters_{};
 };
+
+/// Makes the writer that drops all outputs of a HostMot2 board from a second process, through a socket of its own: one
+/// datagram `PWM 0, enable 0, watchdog bites now`, then a look whether the direction of all pins is 0. The board
+/// answers to each sender, so it works beside the owner; but an owner takes its datagrams for another program's.
+/// @param open_link  throws Unavailable
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(const Hm2Options& options, OpenLink open_link);
 
 }  // namespace abs_hil::driver::hm2

@@ -25,8 +25,14 @@ void Packet::put(std::uint32_t value, unsigned bytes) noexcept {
   for (unsigned i = 0; i < bytes && size_ < bytes_.size(); ++i) bytes_[size_++] = (value >> (8U * i)) & 0xFFU;
 }
 
+namespace {
+
+bool has_32_bit(unsigned space) noexcept { return space == space::hostmot2 || space == space::lock_step; }
+
+}  // namespace
+
 void Packet::command(bool write, unsigned in_space, unsigned units, std::uint16_t address, bool increment) noexcept {
-  const unsigned width = in_space == space::hostmot2 ? 2 : 1;
+  const unsigned width = has_32_bit(in_space) ? 2 : 1;
   put((write ? 0x8000U : 0U) | 0x4000U | in_space << 10U | width << 8U | (increment ? 0x80U : 0U) | units, 2);
   put(address, 2);
 }
@@ -34,7 +40,7 @@ void Packet::command(bool write, unsigned in_space, unsigned units, std::uint16_
 std::size_t Packet::read(unsigned from_space, std::uint16_t address, unsigned units) noexcept {
   const std::size_t where = answer_bytes_;
   command(false, from_space, units, address, from_space == space::hostmot2 || units > 1);
-  answer_bytes_ += units * (from_space == space::hostmot2 ? 4U : 2U);
+  answer_bytes_ += units * (has_32_bit(from_space) ? 4U : 2U);
   return where;
 }
 
@@ -43,21 +49,8 @@ void Packet::write32(std::uint16_t address, std::span<const std::uint32_t> value
   for (const std::uint32_t value : values) put(value, 4);
 }
 
-std::size_t Packet::read_cookie(unsigned of_space) noexcept {
-  put(0x6101U | of_space << 10U, 2);
-  put(0, 2);
-  return std::exchange(answer_bytes_, answer_bytes_ + 2);
-}
-
-std::size_t Packet::read_time() noexcept {
-  put(0x4282U | space::lock_step << 10U, 2);
-  put(0, 2);
-  return std::exchange(answer_bytes_, answer_bytes_ + 8);
-}
-
 void Packet::write_time(std::uint64_t time_ns) noexcept {
-  put(0xC282U | space::lock_step << 10U, 2);
-  put(0, 2);
+  command(true, space::lock_step, 2, 0, true);
   put(static_cast<std::uint32_t>(time_ns), 4);
   put(static_cast<std::uint32_t>(time_ns >> 32U), 4);
 }

@@ -1,10 +1,10 @@
 #pragma once
 
-// LBP16, the protocol of HostMot2 boards over UDP (docs/hm2.md).
+// The wire of a HostMot2 board over UDP (docs/hm2.md): its protocol LBP16, a cycle's datagrams, its descriptors.
 //
 // A datagram is a list of commands: a 16-bit word, a 16-bit byte address, then the data of a write, all little-endian.
-//   word = write << 15 | address follows << 14 | space << 10 | unit (0: 8 bit, 1: 16, 2: 32) << 8 | increment << 7 |
-//   units
+//   word = write << 15 | address follows << 14 | info << 13 | space << 10 | unit (0: 8 bit, 1: 16, 2: 32) << 8 |
+//   increment << 7 | units
 // The board answers all reads of one datagram, in order, with one datagram; it does not answer writes.
 
 #include <netinet/in.h>
@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/board_options.hpp"
 #include "driver/file_descriptor.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -29,9 +30,10 @@ namespace space {
 inline constexpr unsigned hostmot2 = 0;  ///< 32 bit
 inline constexpr unsigned eeprom = 2;    ///< these and all below: 16 bit
 inline constexpr unsigned timers = 4;
-inline constexpr unsigned lock_step = 5;  ///< of emulators in lock-step alone: their time, ns, 64 bit
+inline constexpr unsigned lock_step = 5;  ///< of emulators in lock-step alone: their time, ns, in two of 32 bit
 inline constexpr unsigned status = 6;
 inline constexpr unsigned board_info = 7;
+inline constexpr unsigned info = 8;  ///< with one of them: about that space, from its cookie on, 16 bit
 }  // namespace space
 
 /// Addresses that do not depend on the board's descriptors.
@@ -52,9 +54,6 @@ class Packet {
   std::size_t read(unsigned from_space, std::uint16_t address, unsigned units = 1) noexcept;
   void write32(std::uint16_t address, std::span<const std::uint32_t> values) noexcept;
   void write32(std::uint16_t address, std::uint32_t value) noexcept { write32(address, {&value, 1}); }
-  /// Asks for the cookie of a space that may not be there.
-  std::size_t read_cookie(unsigned of_space) noexcept;
-  std::size_t read_time() noexcept;
   void write_time(std::uint64_t time_ns) noexcept;
   /// Writes a number into the scratch words.
   void write_number(std::uint16_t address, std::uint32_t number) noexcept;
@@ -194,5 +193,83 @@ struct CycleWire {
   [[nodiscard]] Packet write(const PortWords& data, const std::array<std::uint32_t, 2>& pwm_values,
                              std::uint32_t write_number) const noexcept;
 };
+
+// A board as its own descriptors show it: cookie, IDROM, modules, pins, clocks. Nothing about it is assumed.
+
+/// One module of the board: register k of instance i is at base + k · register_stride + i · instance_stride.
+struct Module {
+  unsigned instances{0};
+  std::uint16_t base{0};
+  std::uint16_t register_stride{0};
+  std::uint16_t instance_stride{0};
+  double clock_Hz{0.0};
+  [[nodiscard]] std::uint16_t address(unsigned reg, unsigned instance = 0) const noexcept {
+    return static_cast<std::uint16_t>(base + reg * register_stride + instance * instance_stride);
+  }
+};
+
+/// What the registers of the modules are.
+namespace reg {
+enum Watchdog : unsigned { time, bitten, pet };
+enum Port : unsigned { data, direction, alternate_source, open_drain, invert };
+enum Counter : unsigned { count, control, stamp_divisor, stamp_clock, filter };
+enum Pwm : unsigned { value, mode, rate, pdm_rate, enable };
+}  // namespace reg
+
+/// One of the module's functions at an I/O pin.
+struct Pin {
+  std::uint8_t function{0};  ///< bit 7: output
+  std::uint8_t tag{0};
+  std::uint8_t unit{0};
+};
+namespace tag {
+inline constexpr std::uint8_t watchdog = 2;
+inline constexpr std::uint8_t port = 3;
+inline constexpr std::uint8_t counter = 4;
+inline constexpr std::uint8_t pwm = 6;
+}  // namespace tag
+inline constexpr std::uint8_t pwm_output = 0x81;
+
+/// A board as it describes itself.
+struct Board {
+  std::string name{};  ///< "7I92"
+  std::string idrom_name{};
+  unsigned protocol_version{0};
+  unsigned firmware_version{0};
+  std::string mac{};
+  double clock_low_Hz{0.0};
+  double clock_high_Hz{0.0};
+  unsigned ports{0};
+  unsigned port_width{0};
+  Module watchdog{};
+  Module port{};
+  Module counter{};
+  Module pwm{};
+  std::vector<Pin> pins{};
+  std::vector<std::string> modules{};  ///< each in words
+};
+
+/// One word for each of the board's ports.
+[[nodiscard]] inline std::span<const std::uint32_t> of_ports(const PortWords& words, const Board& board) noexcept {
+  return {words.data(), board.ports};
+}
+
+/// Reads who the board is, all descriptors, and checks each of them. Writes nothing but the scratch word of `ask`.
+/// Throws Unavailable, naming the fact, for a board that does not answer, that describes something impossible, or that
+/// lacks a watchdog, two counters or two PWMs of a known version.
+[[nodiscard]] Board read_board(Link& link, const std::string& place, std::uint32_t& number);
+
+/// The pins that a rig uses, as words for the ports' registers.
+struct UsedPins {
+  PortWords outputs{};   ///< the direction register while active
+  PortWords modules{};   ///< pins that carry their module
+  PortWords inverted{};  ///< outputs that are active low
+  PortWords enable{};    ///< the motor's enable line
+  PortWords relay{};     ///< the line that changes with each command
+};
+
+/// Finds the pins of the options' PWMs, counters and lines.
+/// Throws Unavailable, naming the key, if the board has them elsewhere or lacks them, or if a pin has two uses.
+[[nodiscard]] UsedPins find_pins(const Board& board, const Hm2Options& options);
 
 }  // namespace abs_hil::driver::hm2

@@ -122,15 +122,18 @@ double shifted(double value, double offset) noexcept { return value + offset; }
 double inverted(double flag, double) noexcept { return 1.0 - flag; }
 double other_flags(double flags, double) noexcept { return 7.0 - flags; }
 
-constexpr NumberFaults stamp_faults{.garbage_most = 1e12, .whole = true, .wrong = scaled};
-constexpr NumberFaults supply_faults{.garbage_most = 48.0, .wrong = scaled};
-constexpr NumberFaults temperature_faults{
-    .off = not_known, .garbage_least = -50.0, .garbage_most = 250.0, .wrong = shifted};
-constexpr NumberFaults trip_faults{
-    .garbage_most = 8.0, .whole = true, .wrong = other_flags, .intermittently_wrong = true};
-constexpr NumberFaults duty_faults{.wrong = scaled_duty};
-constexpr NumberFaults torque_faults{.garbage_most = 10.0, .wrong = scaled};
-constexpr NumberFaults enable_faults{.garbage_most = 2.0, .whole = true, .wrong = inverted};
+enum Number : std::size_t { stamp, supply, temperature, trip, motor, brake, brake_torque, enable };
+/// The brake's torque, for the ideal actuator, fails with the brake's duty.
+constexpr std::array<NumberFaults, 8> number_faults{{
+    {.garbage_most = 1e12, .whole = true, .wrong = scaled},
+    {.garbage_most = 48.0, .wrong = scaled},
+    {.off = not_known, .garbage_least = -50.0, .garbage_most = 250.0, .wrong = shifted},
+    {.garbage_most = 8.0, .whole = true, .wrong = other_flags, .intermittently_wrong = true},
+    {.wrong = scaled_duty},
+    {.wrong = scaled_duty},
+    {.garbage_most = 10.0, .wrong = scaled},
+    {.garbage_most = 2.0, .whole = true, .wrong = inverted},
+}};
 
 /// NaN equals NaN here: both mean "not known".
 bool differ(double a, double b) noexcept { return a != b && !(std::isnan(a) && std::isnan(b)); }
@@ -151,18 +154,10 @@ InjectingDriver::InjectingDriver(std::unique_ptr<RigDriver> inner, const std::ve
     : inner_(std::move(inner)),
       seed_(seed),
       pass_time_(std::move(pass_time)),
-      stamp_(stamp_faults),
-      supply_(supply_faults),
-      temperature_(temperature_faults),
-      trip_(trip_faults),
-      motor_(duty_faults),
-      brake_(duty_faults),
-      brake_torque_(torque_faults),
-      enable_(enable_faults) {
+      numbers_{number_faults[stamp], number_faults[supply], number_faults[temperature],  number_faults[trip],
+               number_faults[motor], number_faults[brake],  number_faults[brake_torque], number_faults[enable]} {
   for (const Injection& injection : injections) planned_.push_back({injection});
 }
-
-InjectingDriver::~InjectingDriver() { static_cast<void>(deactivate()); }
 
 std::vector<std::string> InjectingDriver::notes() const {
   std::vector<std::string> notes = inner_->notes();
@@ -187,10 +182,7 @@ void InjectingDriver::do_activate(std::int64_t now_ns) {
   first_read_ = true;
   delivered_ = {};
   passed_ = {};
-  for (NumberChannel* channel :
-       {&stamp_, &supply_, &temperature_, &trip_, &motor_, &brake_, &brake_torque_, &enable_}) {
-    channel->start();
-  }
+  for (NumberChannel& number : numbers_) number.start();
   answers_.clear();
   commands_.clear();
   for (Planned& planned : planned_) planned.entered_ns = planned.injection.phase ? -1 : now_ns;
@@ -265,8 +257,8 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
   const auto garble = [&] {
     measurement.upper_counts = any_counts(random_);
     measurement.lower_counts = any_counts(random_);
-    measurement.time_ns = static_cast<std::int64_t>(uniform(random_) * stamp_faults.garbage_most);
-    measurement.supply_V = uniform(random_) * supply_faults.garbage_most;
+    measurement.time_ns = static_cast<std::int64_t>(uniform(random_) * number_faults[stamp].garbage_most);
+    measurement.supply_V = uniform(random_) * number_faults[supply].garbage_most;
     measurement.trip_flags = static_cast<std::uint32_t>(random_() >> 61U);
     measurement.upper_edge_age_ns = any_counts(random_);
     measurement.lower_edge_age_ns = any_counts(random_);
@@ -323,15 +315,12 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
 }
 
 void InjectingDriver::fail_numbers(rig::Measurement& measurement) noexcept {
-  const auto pass = [this](NumberChannel& channel, InjectionSignal signal, double value) {
-    return channel.pass(value, fault_of(signal), now_ns_, random_);
-  };
   // A double holds whole ns for 104 days.
   measurement.time_ns =
-      static_cast<std::int64_t>(pass(stamp_, InjectionSignal::stamp, static_cast<double>(measurement.time_ns)));
-  measurement.supply_V = pass(supply_, InjectionSignal::supply, measurement.supply_V);
-  measurement.temperature_C = pass(temperature_, InjectionSignal::temperature, measurement.temperature_C);
-  measurement.trip_flags = static_cast<std::uint32_t>(pass(trip_, InjectionSignal::trip, measurement.trip_flags));
+      static_cast<std::int64_t>(pass(stamp, InjectionSignal::stamp, static_cast<double>(measurement.time_ns)));
+  measurement.supply_V = pass(supply, InjectionSignal::supply, measurement.supply_V);
+  measurement.temperature_C = pass(temperature, InjectionSignal::temperature, measurement.temperature_C);
+  measurement.trip_flags = static_cast<std::uint32_t>(pass(trip, InjectionSignal::trip, measurement.trip_flags));
 }
 
 IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
@@ -339,7 +328,7 @@ IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& se
   const auto garble = [&] {
     passed.motor_duty = uniform(random_);
     passed.brake_duty = uniform(random_);
-    passed.brake_torque_Nm = uniform(random_) * torque_faults.garbage_most;
+    passed.brake_torque_Nm = uniform(random_) * number_faults[brake_torque].garbage_most;
     passed.motor_enable = uniform(random_) < 0.5;
   };
   const auto spoil = [&](double factor) {
@@ -352,12 +341,10 @@ IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& se
     note_effect(true);
     return lost;
   }
-  passed.motor_duty = motor_.pass(passed.motor_duty, fault_of(InjectionSignal::motor_pwm), now_ns_, random_);
-  const ActiveFault brake = fault_of(InjectionSignal::brake_pwm);
-  passed.brake_duty = brake_.pass(passed.brake_duty, brake, now_ns_, random_);
-  passed.brake_torque_Nm = brake_torque_.pass(passed.brake_torque_Nm, brake, now_ns_, random_);
-  const ActiveFault enable = fault_of(InjectionSignal::enable);
-  passed.motor_enable = enable_.pass(passed.motor_enable ? 1.0 : 0.0, enable, now_ns_, random_) > 0.5;
+  passed.motor_duty = pass(motor, InjectionSignal::motor_pwm, passed.motor_duty);
+  passed.brake_duty = pass(brake, InjectionSignal::brake_pwm, passed.brake_duty);
+  passed.brake_torque_Nm = pass(brake_torque, InjectionSignal::brake_pwm, passed.brake_torque_Nm);
+  passed.motor_enable = pass(enable, InjectionSignal::enable, passed.motor_enable ? 1.0 : 0.0) > 0.5;
   const bool changed = passed.motor_duty != command.motor_duty || passed.brake_duty != command.brake_duty ||
                        passed.brake_torque_Nm != command.brake_torque_Nm || passed.motor_enable != command.motor_enable;
   note_effect(changed || fault_of(InjectionSignal::write).kind == InjectionKind::slow);

@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -108,7 +109,7 @@ struct NumberFaults {
 /// A signal that is a number: a duty, a voltage, a flag, a time.
 class NumberChannel {
  public:
-  explicit NumberChannel(const NumberFaults& faults) : faults_(faults) {}
+  NumberChannel(const NumberFaults& faults) : faults_(faults) {}
   /// Starts anew, with nothing delivered.
   void start() noexcept;
   [[nodiscard]] double pass(double value, const ActiveFault& fault, std::int64_t now_ns,
@@ -132,7 +133,7 @@ class InjectingDriver final : public RigDriver {
   /// @param pass_time may be empty; then slow calls take no time
   InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections, std::uint64_t seed,
                   PassTime pass_time);
-  ~InjectingDriver() override;
+  ~InjectingDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return inner_->name(); }
   [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
@@ -179,6 +180,10 @@ class InjectingDriver final : public RigDriver {
   /// Of faults given for either signal.
   [[nodiscard]] ActiveFault fault_of(InjectionSignal signal, InjectionSignal or_of) const noexcept;
   void note_effect(bool differs) noexcept;
+  /// What the fault of `signal` makes of a value.
+  [[nodiscard]] double pass(std::size_t number, InjectionSignal signal, double value) noexcept {
+    return numbers_[number].pass(value, fault_of(signal), now_ns_, random_);
+  }
   void fail_encoders(rig::Measurement& measurement) noexcept;
   void fail_numbers(rig::Measurement& measurement) noexcept;
   /// A fault of a whole answer or command. `last` is the one before, `garble` makes random values of this one, `spoil`
@@ -202,14 +207,7 @@ class InjectingDriver final : public RigDriver {
   rig::Command passed_{};         ///< last command passed on
   DelayLine<rig::Measurement> answers_{};
   DelayLine<rig::Command> commands_{};
-  NumberChannel stamp_;
-  NumberChannel supply_;
-  NumberChannel temperature_;
-  NumberChannel trip_;
-  NumberChannel motor_;
-  NumberChannel brake_;
-  NumberChannel brake_torque_;  ///< for the ideal actuator; has the faults of the brake's duty
-  NumberChannel enable_;
+  std::array<NumberChannel, 8> numbers_;  ///< by the numbers' place in the table of their faults
 };
 
 }  // namespace abs_hil::driver

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 #include "rig/formatted_text.hpp"
@@ -18,20 +19,16 @@ constexpr std::array<std::string_view, injection_signal_count> signals{
     "trip",          "read",          "motor_pwm", "brake_pwm", "enable", "write"};
 constexpr std::array<std::string_view, injection_kind_count> kinds{"ok",    "off",  "stuck",   "garbage",
                                                                    "wrong", "slow", "delayed", "intermittent"};
-constexpr std::array<rig::Phase, 6> phases{rig::Phase::idle,  rig::Phase::accelerate, rig::Phase::coast,
-                                           rig::Phase::brake, rig::Phase::hold,       rig::Phase::stopped};
 constexpr std::string_view any_phase = "any";
+constexpr std::array<std::string_view, 7> phases{"idle", "accelerate", "coast", "brake", "hold", "stopped", any_phase};
+static_assert(phases[static_cast<std::size_t>(rig::Phase::stopped)] == rig::name_of(rig::Phase::stopped));
 constexpr double longest_delay_s = 600.0;
 /// Longest delay of `delayed` and `slow`; the memory suffices for it at 10 kHz.
 constexpr double longest_holding_s = 0.5;
 
-template <std::size_t n>
-std::string listed(const std::array<std::string_view, n>& names) {
+std::string listed(std::span<const std::string_view> names) {
   std::string text;
-  for (const std::string_view name : names) {
-    if (!text.empty()) text += ' ';
-    text += name;
-  }
+  for (const std::string_view name : names) text.append(text.empty() ? "" : " ").append(name);
   return text;
 }
 
@@ -83,23 +80,11 @@ Parameter parameter_of(InjectionSignal signal, InjectionKind kind) {
   }
 }
 
-template <std::size_t n>
-std::size_t place_of(std::string_view text, std::string_view part, const std::array<std::string_view, n>& names,
+std::size_t place_of(std::string_view text, std::string_view part, std::span<const std::string_view> names,
                      const char* what) {
-  for (std::size_t i = 0; i < n; ++i) {
-    if (names[i] == part) return i;
-  }
-  refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
-}
-
-std::optional<rig::Phase> phase_of(std::string_view text, std::string_view part) {
-  if (part == any_phase) return std::nullopt;
-  std::string known;
-  for (const rig::Phase phase : phases) {
-    if (rig::name_of(phase) == part) return phase;
-    known += std::string(rig::name_of(phase)) + ' ';
-  }
-  refuse(text, part, "not a phase; known: " + known + std::string(any_phase));
+  const auto found = std::ranges::find(names, part);
+  if (found == names.end()) refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
+  return static_cast<std::size_t>(found - names.begin());
 }
 
 /// Cuts off and returns what follows the last `mark`; nothing if there is none.
@@ -149,7 +134,8 @@ Injection parse_injection(std::string_view text) {
   if (!kind) refuse(text, rest, "no \":KIND\"; known: " + listed(kinds));
   const auto signal = cut(rest, '@');
   if (!signal) refuse(text, rest, "no \"PHASE@\" before the signal");
-  injection.phase = phase_of(text, rest);
+  const std::size_t phase = place_of(text, rest, phases, "phase");
+  if (phases[phase] != any_phase) injection.phase = static_cast<rig::Phase>(phase);
   injection.signal = static_cast<InjectionSignal>(place_of(text, *signal, signals, "signal"));
   injection.kind = static_cast<InjectionKind>(place_of(text, *kind, kinds, "kind"));
   read_parameter(text, parameter, injection);

@@ -1,15 +1,11 @@
 // Finds the card in sysfs and checks that a run can use it.
-#include "driver/pci/discovery.hpp"
-
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
 #include <system_error>
 
-#include "driver/board_kit.hpp"
-#include "driver/file_descriptor.hpp"
-#include "driver/pci/register_map.hpp"
+#include "driver/pci/wire.hpp"
 #include "driver/sysfs.hpp"
 #include "rig/formatted_text.hpp"
 
@@ -62,6 +58,62 @@ std::string choose(const PciOptions& options) {
   return cards.front();
 }
 
+/// BAR 2 as sysfs' `resource` describes it.
+struct BarInfo {
+  std::uint64_t bytes{0};
+  bool io_ports{false};
+  bool unset{false};     ///< neither firmware nor kernel has given it an address
+  bool disabled{false};  ///< the kernel has switched it off
+};
+/// Throws Unavailable if the file cannot be read as a table of regions.
+BarInfo read_bar2(const fs::path& device_folder) {
+  // A line for each region: "0x000000000000e000 0x000000000000e0ff 0x0000000000040101", start, end and flags.
+  const fs::path file = device_folder / "resource";
+  std::ifstream in(file);
+  std::string line;
+  for (int number = 0; number <= bar_number; ++number) {
+    if (!std::getline(in, line)) refuse(file.string() + ": cannot be read as far as BAR 2");
+  }
+  std::uint64_t start = 0;
+  std::uint64_t end = 0;
+  std::uint64_t flags = 0;
+  if (std::sscanf(line.c_str(), "%" SCNx64 " %" SCNx64 " %" SCNx64, &start, &end, &flags) != 3) {
+    refuse(file.string() + ": \"" + line + "\" is not a region: start, end and flags in hexadecimal");
+  }
+  const bool absent = start == 0 && end == 0;
+  return {.bytes = absent || end < start ? 0 : end - start + 1,
+          .io_ports = (flags & ioresource_io) != 0,
+          .unset = start == 0 || (flags & ioresource_unset) != 0,
+          .disabled = (flags & ioresource_disabled) != 0};
+}
+
+/// Throws Unavailable unless BAR 2 has the kind and size of the card's.
+void check_bar2(const fs::path& folder) {
+  const BarInfo bar = read_bar2(folder);
+  const std::string place = (folder / "resource").string() + ": BAR 2 ";
+  const std::string needed = std::to_string(window_bytes);
+  constexpr const char* other_card = "this is another card, or it has another board logic; nothing was written";
+  if (bar.bytes == 0) refuse(place + "is missing; the card must have one of " + needed + " bytes");
+  if (!bar.io_ports) refuse(place + "is memory, not I/O ports: " + other_card);
+  if (bar.bytes < window_bytes) {
+    refuse(place + "has " + std::to_string(bar.bytes) + " bytes; the register map needs " + needed + ": " + other_card);
+  }
+  // sysfs gives the file the size of the BAR, or the size 0, which tells nothing. Otherwise both sizes must agree.
+  std::error_code error;
+  const std::uintmax_t file_bytes = fs::file_size(folder / "resource2", error);
+  if (!error && file_bytes != 0 && file_bytes < window_bytes) {
+    refuse((folder / "resource2").string() + " has " + std::to_string(file_bytes) + " bytes; the register map needs " +
+           needed + "; nothing was written");
+  }
+}
+
+/// True if the kernel of this tree of files is locked down and refuses to write to I/O ports.
+bool is_locked_down(const fs::path& devices) {
+  // ROOT/sys/bus/pci/devices -> ROOT/sys/kernel/security/lockdown, "none [integrity] confidentiality"
+  const std::string line = line_in((devices / "../../../kernel/security/lockdown").lexically_normal());
+  return line.find('[') != std::string::npos && line.find("[none]") == std::string::npos;
+}
+
 /// An access would reach something else than the card. A device that is not enabled may still take accesses: the
 /// kernel's `enable` counts users, and 0 does not switch the ports off.
 Obstacles port_obstacles(const fs::path& device) {
@@ -71,6 +123,28 @@ Obstacles port_obstacles(const fs::path& device) {
                ": an access would reach other devices of this computer",
            "shut down and put the card into another slot, or let the BIOS assign resources (\"PnP OS\" off); "
            "lspci -vv shows region 2"}};
+}
+
+/// What the kernel's files say against driving the card in this folder: its ports lead elsewhere or nowhere, another
+/// driver owns it, or the kernel takes no writes. Accesses no register. Throws Unavailable if the table of regions
+/// cannot be read.
+Obstacles card_obstacles(const fs::path& device) {
+  Obstacles found = port_obstacles(device);
+  if (number_in(device / "enable", 10) == 0) {
+    found.push_back({"not enabled", "echo 1 | sudo tee " + device.string() + "/enable"});
+  }
+  std::error_code none_bound;
+  const fs::path bound = fs::read_symlink(device / "driver", none_bound);
+  if (!none_bound) {
+    found.push_back({"owned by the kernel driver " + bound.filename().string(),
+                     "echo " + device.filename().string() + " | sudo tee " + device.string() + "/driver/unbind"});
+  }
+  if (is_locked_down(device.parent_path())) {
+    found.push_back({"the kernel is locked down (Secure Boot) and refuses every write to I/O ports",
+                     "switch Secure Boot off in the computer's firmware, or boot without lockdown=; cat "
+                     "/sys/kernel/security/lockdown shows it"});
+  }
+  return found;
 }
 
 void refuse_obstacles(const fs::path& folder, const Obstacles& obstacles) {
@@ -129,71 +203,6 @@ std::vector<std::string> find_cards(const fs::path& root) {
   }
   std::sort(cards.begin(), cards.end());
   return cards;
-}
-
-BarInfo read_bar2(const fs::path& device_folder) {
-  // A line for each region: "0x000000000000e000 0x000000000000e0ff 0x0000000000040101", start, end and flags.
-  const fs::path file = device_folder / "resource";
-  std::ifstream in(file);
-  std::string line;
-  for (int number = 0; number <= bar_number; ++number) {
-    if (!std::getline(in, line)) refuse(file.string() + ": cannot be read as far as BAR 2");
-  }
-  std::uint64_t start = 0;
-  std::uint64_t end = 0;
-  std::uint64_t flags = 0;
-  if (std::sscanf(line.c_str(), "%" SCNx64 " %" SCNx64 " %" SCNx64, &start, &end, &flags) != 3) {
-    refuse(file.string() + ": \"" + line + "\" is not a region: start, end and flags in hexadecimal");
-  }
-  const bool absent = start == 0 && end == 0;
-  return {.bytes = absent || end < start ? 0 : end - start + 1,
-          .io_ports = (flags & ioresource_io) != 0,
-          .unset = start == 0 || (flags & ioresource_unset) != 0,
-          .disabled = (flags & ioresource_disabled) != 0};
-}
-
-void check_bar2(const fs::path& folder) {
-  const BarInfo bar = read_bar2(folder);
-  const std::string place = (folder / "resource").string() + ": BAR 2 ";
-  const std::string needed = std::to_string(window_bytes);
-  constexpr const char* other_card = "this is another card, or it has another board logic; nothing was written";
-  if (bar.bytes == 0) refuse(place + "is missing; the card must have one of " + needed + " bytes");
-  if (!bar.io_ports) refuse(place + "is memory, not I/O ports: " + other_card);
-  if (bar.bytes < window_bytes) {
-    refuse(place + "has " + std::to_string(bar.bytes) + " bytes; the register map needs " + needed + ": " + other_card);
-  }
-  // sysfs gives the file the size of the BAR, or the size 0, which tells nothing. Otherwise both sizes must agree.
-  std::error_code error;
-  const std::uintmax_t file_bytes = fs::file_size(folder / "resource2", error);
-  if (!error && file_bytes != 0 && file_bytes < window_bytes) {
-    refuse((folder / "resource2").string() + " has " + std::to_string(file_bytes) + " bytes; the register map needs " +
-           needed + "; nothing was written");
-  }
-}
-
-bool is_locked_down(const fs::path& devices) {
-  // ROOT/sys/bus/pci/devices -> ROOT/sys/kernel/security/lockdown, "none [integrity] confidentiality"
-  const std::string line = line_in((devices / "../../../kernel/security/lockdown").lexically_normal());
-  return line.find('[') != std::string::npos && line.find("[none]") == std::string::npos;
-}
-
-Obstacles card_obstacles(const fs::path& device) {
-  Obstacles found = port_obstacles(device);
-  if (number_in(device / "enable", 10) == 0) {
-    found.push_back({"not enabled", "echo 1 | sudo tee " + device.string() + "/enable"});
-  }
-  std::error_code none_bound;
-  const fs::path bound = fs::read_symlink(device / "driver", none_bound);
-  if (!none_bound) {
-    found.push_back({"owned by the kernel driver " + bound.filename().string(),
-                     "echo " + device.filename().string() + " | sudo tee " + device.string() + "/driver/unbind"});
-  }
-  if (is_locked_down(device.parent_path())) {
-    found.push_back({"the kernel is locked down (Secure Boot) and refuses every write to I/O ports",
-                     "switch Secure Boot off in the computer's firmware, or boot without lockdown=; cat "
-                     "/sys/kernel/security/lockdown shows it"});
-  }
-  return found;
 }
 
 std::vector<FoundBoard> survey_cards(const PciOptions& options) try {

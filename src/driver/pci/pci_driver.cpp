@@ -1,6 +1,7 @@
 // The driver of the RT-DAC4/PCI: activation, one cycle of register accesses, safe state.
 #include "driver/pci/pci_driver.hpp"
 
+#include <optional>
 #include <utility>
 
 namespace abs_hil::driver::pci {
@@ -26,10 +27,7 @@ class PciDriver::Access {
   std::uint32_t read(std::uint32_t offset) noexcept {
     std::uint32_t value = 0;
     if (result_.ok()) result_ = window_.read32(offset, value);
-    if (result_.ok() && value == all_ones) {
-      saw_all_ones_ = true;
-      all_ones_at_ = offset;
-    }
+    if (result_.ok() && value == all_ones) all_ones_at_ = offset;
     return value;
   }
   void write(std::uint32_t offset, std::uint32_t value) noexcept {
@@ -40,14 +38,13 @@ class PciDriver::Access {
   }
 
   [[nodiscard]] const IoResult& result() const noexcept { return result_; }
-  [[nodiscard]] bool saw_all_ones() const noexcept { return saw_all_ones_; }
-  [[nodiscard]] std::uint32_t all_ones_at() const noexcept { return all_ones_at_; }
+  /// Of the last register that read as all ones; nothing if none did.
+  [[nodiscard]] std::optional<std::uint32_t> all_ones_at() const noexcept { return all_ones_at_; }
 
  private:
   RegisterWindow& window_;
   IoResult result_{};
-  bool saw_all_ones_{false};
-  std::uint32_t all_ones_at_{0};
+  std::optional<std::uint32_t> all_ones_at_{};
 };
 
 PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
@@ -57,8 +54,6 @@ PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock re
       open_card_(std::move(open_card)) {
   check_options("driver.pci.", options);
 }
-
-PciDriver::~PciDriver() { static_cast<void>(deactivate()); }
 
 void PciDriver::do_configure() {
   card_ = {};  // releases the lock if this driver holds it
@@ -181,12 +176,12 @@ bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2
 }
 
 IoResult PciDriver::checked_for_absence(const Access& card) noexcept {
-  if (!card.saw_all_ones()) return card.result();
+  if (!card.all_ones_at()) return card.result();
   // All ones may be a count of -1. A missing card returns all ones from every register.
   std::uint32_t version = 0;
   const IoResult result = card_.window->read32(reg::bitstream_version, version);
   if (!result.ok()) return result;
-  if (version == all_ones) return {IoError::disconnected, card.all_ones_at()};
+  if (version == all_ones) return {IoError::disconnected, *card.all_ones_at()};
   return card.result();
 }
 

@@ -8,11 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "driver/board_kit.hpp"
-#include "driver/board_options.hpp"
-#include "driver/pci/discovery.hpp"
-#include "driver/pci/register_map.hpp"
-#include "driver/pwm.hpp"
+#include "driver/pci/wire.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -59,7 +55,7 @@ class PciDriver final : public BoardDriver {
   /// @param read_clock  the clock of `now_ns`. The time stamp of the counters is the middle of their reading, so that a
   ///                    delayed answer does not look like speed. Null in virtual time, where reading takes no time.
   PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock = nullptr);
-  ~PciDriver() override;
+  ~PciDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
@@ -110,5 +106,14 @@ class PciDriver final : public BoardDriver {
   std::array<std::uint32_t, settings.size()> settings_{};  ///< at activation
   std::size_t next_setting_{0};
 };
+
+using OpenWindow = std::function<std::unique_ptr<RegisterWindow>()>;
+/// Makes the writer that sets both PWMs of the RT-DAC4/PCI to width 0, then reads both back. Index and data are two
+/// accesses. A live owner between them could send a width to the wrong PWM, or undo the safe state with its next width.
+/// Use it only when the owner no longer writes, or writes only zeros.
+/// @param full_width  of a PWM: it also looks at both before it sets them; 0: it does not look
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(OpenWindow open_window, std::uint32_t full_width = 0);
+/// For the card that the options select, through sysfs. Beside a guardian, which writes zeros as well, it also looks.
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer_of(const PciOptions& options, const RunFacts& run);
 
 }  // namespace abs_hil::driver::pci

@@ -1,6 +1,4 @@
 // Opens, locks, reads and writes the file of a card's registers.
-#include "driver/pci/register_window.hpp"
-
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -14,6 +12,7 @@
 #include <fstream>
 #include <string>
 
+#include "driver/pci/wire.hpp"
 #include "driver/sysfs.hpp"
 
 namespace abs_hil::driver::pci {

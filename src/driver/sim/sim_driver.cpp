@@ -35,12 +35,6 @@ SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start
   }
 }
 
-SimDriver::~SimDriver() { static_cast<void>(deactivate()); }
-
-rig::PlantTruth SimDriver::truth() const noexcept { return plant_.truth(); }
-
-void SimDriver::do_configure() {}  // the plant's options were checked when it was made
-
 void SimDriver::do_activate(std::int64_t now_ns) {
   offsets_ = count_offsets(start_.seed, rig::radians_per_count(plant_.options().rig.encoder_counts_per_rev));
   plant_.reset({.omega1_rad_s = start_.start_speed_rad_s, .omega2_rad_s = start_.start_speed_rad_s});

@@ -32,10 +32,10 @@ class SimDriver final : public BoardDriver {
  public:
   /// Throws std::invalid_argument if an option or the start speed is outside its range.
   SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start);
-  ~SimDriver() override;
+  ~SimDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sim"; }
-  [[nodiscard]] rig::PlantTruth truth() const noexcept override;
+  [[nodiscard]] rig::PlantTruth truth() const noexcept override { return plant_.truth(); }
   void note_wheels_apart(bool apart) noexcept override { plant_.part_wheels(apart); }
   void scale_friction(double factor) noexcept { plant_.scale_friction(factor); }
   /// For tests: the command that acts on the simulated rig.
@@ -48,7 +48,7 @@ class SimDriver final : public BoardDriver {
   }
 
  private:
-  void do_configure() override;
+  void do_configure() override {}  // the plant's options were checked when it was made
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
   IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;

@@ -1,6 +1,4 @@
 // Finds the board in sysfs by its ids and names.
-#include "driver/usb/discovery.hpp"
-
 #include <linux/usb/ch9.h>
 
 #include <algorithm>
@@ -10,7 +8,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/sysfs.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {

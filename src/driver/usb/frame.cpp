@@ -1,7 +1,6 @@
 // Puts outputs into a frame and takes measurements out of one.
-#include "driver/usb/frame.hpp"
-
 #include "driver/pwm.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -58,14 +57,8 @@ std::uint32_t counter_at(std::span<const std::uint8_t> frame, std::int32_t chann
 std::span<const WordGroup> words() noexcept { return table; }
 
 std::string_view name_of(Use use) noexcept {
-  switch (use) {
-    case never: return "never";
-    case kept: return "kept";
-    case checked: return "checked";
-    case received: return "received";
-    case sent: return "sent";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 5> names{"never", "kept", "checked", "received", "sent"};
+  return names[static_cast<std::size_t>(use)];
 }
 
 IoError decode(std::span<const std::uint8_t> bytes, const UsbOptions& options, Contents& contents) noexcept {

@@ -1,6 +1,4 @@
 // Queues and reaps USB request blocks without waiting.
-#include "driver/usb/urb_link.hpp"
-
 #include <fcntl.h>
 #include <linux/ioctl.h>
 #include <linux/usb/ch9.h>
@@ -16,6 +14,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
 

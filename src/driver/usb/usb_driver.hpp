@@ -7,11 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "driver/board_kit.hpp"
-#include "driver/board_options.hpp"
 #include "driver/pwm.hpp"
-#include "driver/usb/frame.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -23,6 +20,8 @@ inline constexpr std::int64_t recovery_bound_ns = 12'100'000'000;
 /// Two tries with a recovery in between. Each try waits for the board to take the frame and to show it.
 inline constexpr std::int64_t usb_make_safe_bound_ns = std::int64_t{2} * 2 * patient_ns + recovery_bound_ns;
 
+using OpenBoard = std::function<Board()>;
+
 /// The RT-DAC/USB2 with generic logic. Not verified on hardware.
 ///
 /// `read` requests a frame and waits for it, at most `answer_timeout_us`; `write` queues a frame and does not wait. A
@@ -33,13 +32,12 @@ inline constexpr std::int64_t usb_make_safe_bound_ns = std::int64_t{2} * 2 * pat
 /// cable is unplugged.
 class UsbDriver final : public BoardDriver {
  public:
-  using OpenBoard = std::function<Board()>;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_board called by `configure`; throws Unavailable
   /// @param read_clock the clock of `now_ns`. The time stamp of the counters is the middle between request and answer.
   ///                   Null in virtual time, where reading takes no time.
   UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock = nullptr);
-  ~UsbDriver() override;
+  ~UsbDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
@@ -89,5 +87,11 @@ class UsbDriver final : public BoardDriver {
   bool lost_this_cycle_{false};
   std::uint64_t frames_lost_{0};
 };
+
+/// Makes the writer of an RT-DAC/USB2's safe state after its owner's end; only one process can claim the board. It
+/// sends zeros whether or not the board answers, and verifies them afterwards. A frame sets all words of the board:
+/// those that are not of the rig come from a frame that the board has shown. If it shows none, its digital lines become
+/// inputs.
+[[nodiscard]] std::unique_ptr<SafeStateWriter> safe_state_writer(const UsbOptions& options, OpenBoard open_board);
 
 }  // namespace abs_hil::driver::usb

@@ -1,8 +1,7 @@
 // Which CAN frames belong to the answer, and how many losses are tolerated.
-#include "driver/can/answer_tracker.hpp"
-
 #include "catch.hpp"
 #include "driver/board_kit.hpp"
+#include "driver/can/can_driver.hpp"
 
 using namespace abs_hil::driver::can;
 

@@ -41,7 +41,7 @@ std::string joined(const std::vector<std::string>& lines) {
 }
 
 /// The socket pair as if it were the CAN interface of these facts.
-CanDriver::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFacts facts) {
+driver::can::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFacts facts) {
   return [open = node.opener(), facts = std::move(facts)] {
     driver::can::Link link = open();
     link.facts = facts;

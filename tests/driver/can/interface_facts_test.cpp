@@ -1,6 +1,6 @@
 // Facts about interfaces from the kernel's messages, which are built here after linux/rtnetlink.h and linux/if_link.h.
 
-#include "driver/can/interface_facts.hpp"
+#include "driver/can/bus.hpp"
 
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>

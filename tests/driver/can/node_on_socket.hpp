@@ -33,11 +33,11 @@ class NodeOnSocket {
 
   /// A new link to the node, with its own socket. The node answers before the driver listens, so that there is no wait
   /// and the result does not depend on the computer's load.
-  [[nodiscard]] driver::can::CanDriver::OpenLink opener(bool can_fd = false) {
+  [[nodiscard]] driver::can::OpenLink opener(bool can_fd = false) {
     return [this, can_fd] { return link(std::make_unique<PromptSocket>(::dup(ends_[0]), *this), can_fd); };
   }
   /// A link to the node in a thread of its own, with which the driver works as with a real one.
-  [[nodiscard]] driver::can::CanDriver::OpenLink opener_to_thread() {
+  [[nodiscard]] driver::can::OpenLink opener_to_thread() {
     thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
     return [this] { return link(std::make_unique<driver::can::FrameSocket>(::dup(ends_[0])), false); };
   }

@@ -1,13 +1,11 @@
 // Boards and options that are refused, and the writer that makes a board safe from another process.
 
 #include "active_rig.hpp"
-#include "driver/hm2/hm2_safe_state.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
 using namespace abs_hil::test;
 using Catch::Matchers::Contains;
-using hm2::Hm2SafeState;
 using rig::Reason;
 
 namespace {
@@ -128,12 +126,12 @@ TEST_CASE("The safe-state writer drops all outputs beside a stopped owner, wheth
   for (const bool answered : {true, false}) {
     Rig rig;
     Cable own(rig.board);
-    hm2::Hm2SafeState writer({}, own.opener());
-    writer.prepare();
+    const auto writer = hm2::safe_state_writer({}, own.opener());
+    writer->prepare();
     REQUIRE(rig.cycles(10, drive).ok());
     REQUIRE(rig.is_on());
     own.loses_answer = [&](const auto&) { return !answered; };
-    CHECK(writer.make_safe().ok() == answered);
+    CHECK(writer->make_safe().ok() == answered);
     CHECK_FALSE(rig.is_on());
     CHECK(rig.board.written[0x4000] == 0);
     CHECK(rig.board.written[0x4400] == 0);
@@ -148,15 +146,15 @@ TEST_CASE("The safe-state writer drops all outputs beside a stopped owner, wheth
 TEST_CASE("The safe-state writer's look writes nothing while all pins are inputs, and zeros otherwise") {
   RegisterBoard board;
   Cable cable(board);
-  hm2::Hm2SafeState writer({}, cable.opener());
-  writer.prepare();
+  const auto writer = hm2::safe_state_writer({}, cable.opener());
+  writer->prepare();
   CHECK(board.writes == 0);
-  CHECK(writer.verify_safe().ok());
+  CHECK(writer->verify_safe().ok());
   CHECK(board.writes == 0);
   board.handle(std::array<std::uint8_t, 8>{0x81, 0xC2, 0x04, 0x11, 2, 0, 0, 0});
-  CHECK(writer.verify_safe().error == IoError::foreign_writer);
+  CHECK(writer->verify_safe().error == IoError::foreign_writer);
   CHECK(board.ddr() == std::array<std::uint32_t, 2>{0, 0});
-  CHECK(writer.verify_safe().ok());
+  CHECK(writer->verify_safe().ok());
 }
 
 TEST_CASE(
@@ -170,8 +168,8 @@ TEST_CASE(
     while_on += rig.is_on() ? 1 : 0;
     return ++sent == 1;
   };
-  hm2::Hm2SafeState writer({}, own.opener());
-  CHECK(writer.make_safe().ok());
+  const auto writer = hm2::safe_state_writer({}, own.opener());
+  CHECK(writer->make_safe().ok());
   CHECK(sent > 20);
   CHECK(while_on == 3);  // the lost zeros, the look, the next zeros
 }
@@ -181,15 +179,16 @@ TEST_CASE("A writer that has never been answered sends zeros to the usual addres
   REQUIRE(rig.cycles(10, drive).ok());
   Cable own(rig.board);
   own.loses_answer = [](const auto&) { return true; };
-  hm2::Hm2SafeState writer({}, own.opener());
-  CHECK_FALSE(writer.make_safe().ok());
+  const auto writer = hm2::safe_state_writer({}, own.opener());
+  CHECK_FALSE(writer->make_safe().ok());
   CHECK_FALSE(rig.is_on());
   own.out = true;
-  hm2::Hm2SafeState late({}, own.opener());
-  CHECK_THROWS_AS(late.prepare(), Unavailable);
-  CHECK_FALSE(late.make_safe().ok());
-  hm2::Hm2SafeState forbidden({}, []() -> std::unique_ptr<hm2::Link> { throw hm2::NoSocket(EAFNOSUPPORT); });
-  CHECK_THAT(error_text(forbidden.make_safe()), Contains("Address family not supported"));
+  const auto late = hm2::safe_state_writer({}, own.opener());
+  CHECK_THROWS_AS(late->prepare(), Unavailable);
+  CHECK_FALSE(late->make_safe().ok());
+  const auto forbidden =
+      hm2::safe_state_writer({}, []() -> std::unique_ptr<hm2::Link> { throw hm2::NoSocket(EAFNOSUPPORT); });
+  CHECK_THAT(error_text(forbidden->make_safe()), Contains("Address family not supported"));
 }
 
 TEST_CASE("The safe-state writer reads the description of a board anew that was silent for three looks") {
@@ -201,13 +200,13 @@ TEST_CASE("The safe-state writer reads the description of a board anew that was 
     return false;
   };
   for (const int silent : {2, 3}) {
-    hm2::Hm2SafeState writer({}, own.opener());
-    writer.prepare();
+    const auto writer = hm2::safe_state_writer({}, own.opener());
+    writer->prepare();
     own.loses_answer = [](const auto&) { return true; };
-    for (int look = 0; look < silent; ++look) CHECK_FALSE(writer.make_safe().ok());
+    for (int look = 0; look < silent; ++look) CHECK_FALSE(writer->make_safe().ok());
     own.loses_answer = [](const auto&) { return false; };
     sent = 0;
-    CHECK(writer.make_safe().ok());
+    CHECK(writer->make_safe().ok());
     CHECK((sent > 10) == (silent == 3));
   }
 }

@@ -1,7 +1,7 @@
 // The doctor's search for PCI cards, in a made-up tree of devices.
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
-#include "driver/pci/discovery.hpp"
+#include "driver/pci/wire.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::pci;

@@ -1,6 +1,4 @@
 // Finding and claiming the one PCI card, in a made-up tree of devices.
-#include "driver/pci/discovery.hpp"
-
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,7 +10,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
-#include "driver/pci/register_window.hpp"
+#include "driver/pci/wire.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil::driver;

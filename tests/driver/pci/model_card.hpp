@@ -10,7 +10,6 @@
 
 #include "driver/pci/pci_driver.hpp"
 #include "emulator/card_model.hpp"
-#include "emulator/register_faults.hpp"
 
 namespace abs_hil::test {
 
@@ -66,7 +65,7 @@ class ModelWindow final : public driver::pci::RegisterWindow {
   ModelCard& card_;
 };
 
-class ModelTime final : public driver::pci::EmulatedTime {
+class ModelTime final : public driver::EmulatedTime {
  public:
   explicit ModelTime(ModelCard& card) : card_(card) {}
   driver::IoResult now(std::int64_t& time_ns) noexcept override {

@@ -1,7 +1,5 @@
 // The safe state from a second process: both PWMs are 0, no matter in which access the owner was killed.
 
-#include "driver/pci/pci_safe_state.hpp"
-
 #include <algorithm>
 
 #include "catch.hpp"
@@ -34,8 +32,8 @@ class StoppedWindow final : public pci::RegisterWindow {
   int& left_;
 };
 
-pci::PciSafeState safe_state_of(ModelCard& card) {
-  return pci::PciSafeState([&card] { return std::make_unique<ModelWindow>(card); });
+std::unique_ptr<SafeStateWriter> safe_state_of(ModelCard& card) {
+  return pci::safe_state_writer([&card] { return std::make_unique<ModelWindow>(card); });
 }
 
 bool both_zero(const ModelCard& card) {
@@ -64,10 +62,10 @@ TEST_CASE("both PWMs are 0 whichever access of its cycle the owner was killed in
           static_cast<void>(owner.write(command));
           left = 0;
         }
-        pci::PciSafeState guardian = safe_state_of(card);
-        guardian.prepare();
+        const auto guardian = safe_state_of(card);
+        guardian->prepare();
         CAPTURE(before.motor_duty, before.brake_duty, command.motor_duty, command.brake_duty, accesses);
-        CHECK(guardian.make_safe().ok());
+        CHECK(guardian->make_safe().ok());
         CHECK(both_zero(card));
       }
     }
@@ -78,9 +76,9 @@ TEST_CASE("why the owner must be ended first: one that goes on between index and
   ModelCard card;
   ModelWindow owner(card);
   REQUIRE(owner.write32(0x60, 1).ok());  // index: brake; stopped here
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
-  REQUIRE(guardian.make_safe().ok());
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
+  REQUIRE(guardian->make_safe().ok());
   REQUIRE(both_zero(card));
   REQUIRE(owner.write32(0x6C, 2000).ok());  // goes on
   CHECK_FALSE(both_zero(card));
@@ -88,8 +86,8 @@ TEST_CASE("why the owner must be ended first: one that goes on between index and
 
 TEST_CASE("preparing writes nothing") {
   ModelCard card;
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
   CHECK(card.traffic.empty());
 }
 
@@ -101,9 +99,9 @@ TEST_CASE("a width that does not become 0 does not count as safe, and the other 
     REQUIRE(owner.write32(0x6C, 3000).ok());
   }
   card.faulty.set("6c:wrong=1");
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
-  const IoResult result = guardian.make_safe();
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
+  const IoResult result = guardian->make_safe();
   CHECK(result.error == IoError::read_back_mismatch);
   CHECK(result.where == 0x6C);
   CHECK(both_zero(card));  // the fault is in the reading
@@ -111,10 +109,10 @@ TEST_CASE("a width that does not become 0 does not count as safe, and the other 
 
 TEST_CASE("all ones means a missing card and is not a width") {
   ModelCard card;
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
   card.faulty.answer_all_ones(true);
-  CHECK(guardian.make_safe().error == IoError::disconnected);
+  CHECK(guardian->make_safe().error == IoError::disconnected);
 }
 
 TEST_CASE("a card that comes back is opened again") {
@@ -123,17 +121,17 @@ TEST_CASE("a card that comes back is opened again") {
   REQUIRE(owner.write32(0x60, 0).ok());
   REQUIRE(owner.write32(0x6C, 3000).ok());
   int opened = 0;
-  pci::PciSafeState guardian([&] {
+  const auto guardian = pci::safe_state_writer([&] {
     ++opened;
     if (card.unplugged) throw Unavailable("gone");
     return std::make_unique<ModelWindow>(card);
   });
-  guardian.prepare();
+  guardian->prepare();
   card.unplugged = true;
-  CHECK(guardian.make_safe().error == IoError::disconnected);
-  CHECK(guardian.make_safe().error == IoError::disconnected);
+  CHECK(guardian->make_safe().error == IoError::disconnected);
+  CHECK(guardian->make_safe().error == IoError::disconnected);
   card.unplugged = false;
-  CHECK(guardian.make_safe().ok());
+  CHECK(guardian->make_safe().ok());
   CHECK(opened == 3);
   CHECK(both_zero(card));
 }
@@ -150,20 +148,20 @@ TEST_CASE("Bits above the documented 16 of the PWM registers mean nothing, to th
     CHECK(owner.write(driving, sent).ok());
     CHECK(sent.motor_duty == Approx(0.9).margin(1.0 / 4095.0));
     CHECK(owner.deactivate().ok());
-    pci::PciSafeState writer = safe_state_of(card);
-    writer.prepare();
-    CHECK(writer.make_safe().ok());
+    const auto writer = safe_state_of(card);
+    writer->prepare();
+    CHECK(writer->make_safe().ok());
     CHECK(both_zero(card));
   }
 }
 
 TEST_CASE("A look at a card whose outputs are 0 takes four accesses and writes no width") {
   ModelCard card;
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
-  REQUIRE(guardian.make_safe().ok());
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
+  REQUIRE(guardian->make_safe().ok());
   card.take_traffic();
-  CHECK(guardian.verify_safe().ok());
+  CHECK(guardian->verify_safe().ok());
   const std::vector<test::RegisterAccess> look{{true, 0x60, 0}, {false, 0x6C, 0}, {true, 0x60, 1}, {false, 0x6C, 0}};
   CHECK(card.take_traffic() == look);
 }
@@ -171,30 +169,30 @@ TEST_CASE("A look at a card whose outputs are 0 takes four accesses and writes n
 TEST_CASE("A look finds a duty on either output, makes both zero and says that something else has written") {
   const std::uint32_t pwm = GENERATE(0U, 1U);
   ModelCard card;
-  pci::PciSafeState guardian = safe_state_of(card);
-  guardian.prepare();
+  const auto guardian = safe_state_of(card);
+  guardian->prepare();
   ModelWindow other(card);
   REQUIRE(other.write32(0x60, pwm).ok());
   REQUIRE(other.write32(0x6C, 3000).ok());
-  const IoResult found = guardian.verify_safe();
+  const IoResult found = guardian->verify_safe();
   CHECK(found.error == IoError::foreign_writer);
   CHECK(found.reason == rig::Reason::foreign_writer);
   CHECK(both_zero(card));
-  CHECK(guardian.verify_safe().ok());
+  CHECK(guardian->verify_safe().ok());
 }
 
 TEST_CASE("A look that cannot tell writes zeros, and its result is theirs") {
   ModelCard card;
-  pci::PciSafeState guardian = safe_state_of(card);
-  CHECK(guardian.verify_safe().ok());  // opens the card
+  const auto guardian = safe_state_of(card);
+  CHECK(guardian->verify_safe().ok());  // opens the card
   card.faulty.answer_all_ones(true);
-  CHECK(guardian.verify_safe().error == IoError::disconnected);
+  CHECK(guardian->verify_safe().error == IoError::disconnected);
   card.faulty.answer_all_ones(false);
   card.unplugged = true;
-  CHECK(guardian.verify_safe().error == IoError::disconnected);
+  CHECK(guardian->verify_safe().error == IoError::disconnected);
   card.unplugged = false;
   card.take_traffic();
-  CHECK(guardian.verify_safe().ok());
+  CHECK(guardian->verify_safe().ok());
   CHECK(std::ranges::count(card.traffic, 0x6CU, &test::RegisterAccess::offset) == 4);  // zeros, read back
 }
 
@@ -205,15 +203,15 @@ TEST_CASE("it says what it found on, once, and looks only if it is told to") {
     for (const auto& [offset, value] : {std::pair{0x60U, 0U}, {0x6CU, 4095U}, {0x60U, 1U}, {0x6CU, 1365U}}) {
       REQUIRE(other.write32(offset, value).ok());
     }
-    pci::PciSafeState writer([&card] { return std::make_unique<ModelWindow>(card); }, full_width);
-    writer.prepare();
-    CHECK(writer.make_safe().ok());
+    const auto writer = pci::safe_state_writer([&card] { return std::make_unique<ModelWindow>(card); }, full_width);
+    writer->prepare();
+    CHECK(writer->make_safe().ok());
     CHECK(both_zero(card));
-    REQUIRE(writer.found().has_value() == (full_width != 0));
+    REQUIRE(writer->found().has_value() == (full_width != 0));
     if (full_width == 0) continue;
-    CHECK(writer.found()->motor_duty == 1.0);
-    CHECK(writer.found()->brake_duty == 1.0 / 3.0);
-    CHECK(writer.make_safe().ok());
-    CHECK_FALSE(rig::acts(*writer.found()));
+    CHECK(writer->found()->motor_duty == 1.0);
+    CHECK(writer->found()->brake_duty == 1.0 / 3.0);
+    CHECK(writer->make_safe().ok());
+    CHECK_FALSE(rig::acts(*writer->found()));
   }
 }

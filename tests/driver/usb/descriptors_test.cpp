@@ -1,8 +1,7 @@
 // Finding the FPGA's interface among a device's descriptors, whole and broken ones.
 
 #include "catch.hpp"
-#include "driver/usb/discovery.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 #include "usbfs_stand_in.hpp"
 
 using namespace abs_hil::driver::usb;

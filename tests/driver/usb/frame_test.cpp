@@ -1,10 +1,9 @@
 // The frames of the RT-DAC/USB2, word by word.
-#include "driver/usb/frame.hpp"
-
 #include <random>
 #include <string>
 
 #include "catch.hpp"
+#include "driver/usb/wire.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;

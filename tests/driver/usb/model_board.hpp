@@ -17,7 +17,7 @@ struct ModelBoard {
   explicit ModelBoard(const emulator::UsbBoardOptions& options = {}) : model(options) {}
 
   /// Opens the board for the driver; the model must outlive it.
-  [[nodiscard]] driver::usb::UsbDriver::OpenBoard opener();
+  [[nodiscard]] driver::usb::OpenBoard opener();
 
   emulator::UsbBoardModel model;
   emulator::UsbFaults faults{};
@@ -111,7 +111,7 @@ class ModelBoardTime final : public driver::EmulatedTime {
   ModelBoard& board_;
 };
 
-inline driver::usb::UsbDriver::OpenBoard ModelBoard::opener() {
+inline driver::usb::OpenBoard ModelBoard::opener() {
   return [this] {
     driver::usb::Board board{.place = "1209:0001 in this process"};
     board.link = std::make_unique<ModelLink>(*this);

@@ -7,7 +7,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "diagnosis/fake_system.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 #include "usbfs_stand_in.hpp"
 
 namespace abs_hil::driver::usb::test_bench {

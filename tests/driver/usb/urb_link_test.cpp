@@ -1,13 +1,12 @@
 // Frames as URBs, with a stand-in for the kernel's usbfs. The kernel's own USB is in the test vm_usb.
 
-#include "driver/usb/urb_link.hpp"
-
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
 
 #include "catch.hpp"
+#include "driver/usb/wire.hpp"
 #include "urb_bench.hpp"
 
 using namespace abs_hil;

@@ -13,8 +13,8 @@
 
 #include "../../runtime/proofs/interposed.hpp"
 #include "catch.hpp"
-#include "driver/usb/urb_link.hpp"
 #include "driver/usb/usb_driver.hpp"
+#include "driver/usb/wire.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;

@@ -5,8 +5,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
-#include "driver/usb/discovery.hpp"
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "driver/usb/urb_link.hpp"
+#include "driver/usb/wire.hpp"
 
 namespace abs_hil::test {
 
