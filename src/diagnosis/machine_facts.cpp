@@ -2,7 +2,6 @@
 #include "diagnosis/machine_facts.hpp"
 
 #include <cstdlib>
-#include <fstream>
 #include <set>
 
 #include "driver/sysfs.hpp"
@@ -37,16 +36,6 @@ std::string preemption_model(const fs::path& root) {
     return mode.empty() ? "dynamic, mode unknown" : mode;
   }
   return version.find("PREEMPT") != std::string::npos ? "full" : version.empty() ? unknown : "none or voluntary";
-}
-
-/// The value of `key` in /proc/cpuinfo.
-std::string cpuinfo(const fs::path& root, std::string_view key) {
-  std::ifstream stream(root / "proc/cpuinfo");
-  for (std::string line; std::getline(stream, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with(key) && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return {};
 }
 
 std::string governors(const fs::path& root) {
@@ -121,8 +110,8 @@ MachineFacts read_machine_facts(const fs::path& root) {
           .governor = governors(root),
           .isolated_cpus = first_line(cpus / "isolated", "none"),
           .online_cpus = first_line(cpus / "online", unknown),
-          .cpu_model = cpuinfo(root, "model name"),
-          .virtual_machine = cpuinfo(root, "flags").find(" hypervisor") != std::string::npos,
+          .cpu_model = driver::value_in(root / "proc/cpuinfo", "model name"),
+          .virtual_machine = driver::value_in(root / "proc/cpuinfo", "flags").find(" hypervisor") != std::string::npos,
           .load_1min = std::strtod(first_line(root / "proc/loadavg").c_str(), nullptr)};
 }
 

@@ -17,7 +17,8 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+
+#include "driver/sysfs.hpp"
 
 namespace abs_hil::runtime {
 
@@ -73,16 +74,8 @@ constexpr std::size_t heap_bytes = 4U << 20U;
 constexpr std::size_t stack_bytes = 256U << 10U;
 constexpr std::size_t page_bytes = 4096;
 
-/// "VmLck" of /proc/self/status, kB; 0 if it cannot be read.
-long locked_kB() {
-  std::ifstream status("/proc/self/status");
-  std::string field;
-  while (status >> field) {
-    long kB = 0;
-    if (field == "VmLck:" && status >> kB) return kB;
-  }
-  return 0;
-}
+/// Memory of this process that is locked, kB; 0 if that cannot be read.
+long locked_kB() { return std::strtol(driver::value_in("/proc/self/status", "VmLck:").c_str(), nullptr, 10); }
 
 void touch(volatile unsigned char* memory, std::size_t bytes) {
   for (std::size_t at = 0; at < bytes; at += page_bytes) memory[at] = 0;
