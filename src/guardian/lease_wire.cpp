@@ -2,7 +2,6 @@
 #include "guardian/lease_wire.hpp"
 
 #include <poll.h>
-#include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -84,10 +83,9 @@ std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
 }
 
 Peer peer_of(int socket) noexcept {
-  ucred credentials{};
-  socklen_t size = sizeof credentials;
-  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {};
-  return {.pid = credentials.pid, .uid = credentials.uid, .gid = credentials.gid};
+  Peer peer{};
+  socklen_t size = sizeof peer;
+  return ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 ? peer : Peer{};
 }
 
 int listen_at(const std::string& path) {
