@@ -1,4 +1,4 @@
-// Starts, arms and ends the guardian that a run has of its own.
+// Starts, arms and ends the guardian that a run has of its own, with the launch configuration that it passes on.
 #include "guardian/guard.hpp"
 
 #include <fcntl.h>
@@ -13,11 +13,15 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"
+#include "rig/parse_json.hpp"
+#include "telemetry/flight_record.hpp"
 
 namespace abs_hil::guardian {
 
@@ -118,6 +122,50 @@ std::string ready_text(const runtime::Scheduling& guardian, const std::string& n
   return rig::formatted("ready %d %d:", guardian.fifo_priority, guardian.memory_locked ? 1 : 0) + notes;
 }
 
+std::string to_json(const LaunchConfig& config) {
+  const telemetry::ExperimentInfo& run = config.run;
+  return nlohmann::json{{"config_json", run.config_json},
+                        {"experiment", run.experiment},
+                        {"controller", run.controller},
+                        {"plant", run.plant},
+                        {"backend", run.backend},
+                        {"version", run.version},
+                        {"realtime", static_cast<int>(config.realtime)},
+                        {"record_prefix", config.record_prefix},
+                        {"signals", run.names.signals}}
+      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+LaunchConfig parse_launch_config(const std::string& json) try {
+  const nlohmann::json object = rig::parse_json(json);
+  return {.run = {.experiment = object.at("experiment"),
+                  .controller = object.at("controller"),
+                  .plant = object.at("plant"),
+                  .backend = object.at("backend"),
+                  .config_json = object.at("config_json"),
+                  .version = object.at("version"),
+                  .names = {.signals = object.at("signals")}},
+          .realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
+          .record_prefix = object.at("record_prefix")};
+} catch (const nlohmann::json::exception& error) {
+  throw std::runtime_error(std::string("guardian: not a launch configuration: ") + error.what());
+}
+
+void write_flight_files(const LaunchConfig& launch, const std::string& channel_prefix,
+                        const runtime::FlightRing& recorder, const GuardianReport& report, std::string account) {
+  if (launch.record_prefix.empty()) return;
+  const auto records = recorder.contents();
+  std::vector<std::string> problems;
+  const auto files = telemetry::write_flight_record(launch.record_prefix,
+                                                    {.records = records,
+                                                     .reason = report.reason,
+                                                     .reason_value = static_cast<double>(report.silence_ns) * 1e-9,
+                                                     .account = std::move(account)},
+                                                    launch.run, channel_prefix, problems);
+  for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
+  for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
+}
+
 std::string guardian_program() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -129,8 +177,8 @@ std::string guardian_program() {
 }
 
 GuardianProcess::GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json)
-    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
-  static_cast<void>(pages_.leave_guard_page());
+    : Guard(Pages()), recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
+  static_cast<void>(pages().leave_guard_page());
 }
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
@@ -153,8 +201,8 @@ void GuardianProcess::start() {
   const auto ready = high_copy(driver::FileDescriptor(pipe[1]));
   reset_page();
   const auto recorder = high_copy(recorder_.descriptor());
-  const auto run_page = high_copy(pages_.descriptors().run);
-  const auto guard_page = high_copy(pages_.descriptors().guard);
+  const auto run_page = high_copy(pages().descriptors().run);
+  const auto guard_page = high_copy(pages().descriptors().guard);
   const auto controller = high_copy(driver::FileDescriptor(open_pidfd(::getpid())));
   const auto launch_config = high_copy(driver::FileDescriptor(text_in_memory(launch_config_)));
 

@@ -15,9 +15,8 @@
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
 #include "guardian/guard.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
-#include "guardian/guarding.hpp"
-#include "guardian/launch_config.hpp"
 #include "guardian/linux_process.hpp"
 #include "runtime/board_policy.hpp"
 

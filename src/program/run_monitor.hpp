@@ -5,7 +5,7 @@
 #include <string>
 
 #include "guardian/guard.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
 #include "run/run.hpp"
