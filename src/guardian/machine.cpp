@@ -182,7 +182,7 @@ Interruption SleepWatch::interruption() {
           .bars_leases =
               [this] { return going_to_sleep_ ? std::string("the computer is about to be suspended") : std::string(); },
           .dealt_with =
-              [this](bool) {
+              [this] {
                 if (going_to_sleep_) dealt_with_.signal();
               }};
 }

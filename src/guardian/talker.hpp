@@ -29,11 +29,11 @@ struct Interruption {
   /// Reads the descriptor. Returns why a lease must end; `none`: nothing but a new look at the board is needed.
   std::function<rig::Reason()> take;
   /// Called when a lease is granted and when it has ended.
-  std::function<void(bool held)> lease_changed{};
+  std::function<void(bool held)> lease_changed{[](bool) {}};
   /// Why nobody gets a lease at present; empty: no objection.
-  std::function<std::string()> bars_leases{};
+  std::function<std::string()> bars_leases{[] { return std::string(); }};
   /// Called once nobody has a lease and the board was made safe, or could not be.
-  std::function<void(bool safe)> dealt_with{};
+  std::function<void()> dealt_with{[] {}};
 };
 
 struct TalkerParts {
@@ -112,7 +112,6 @@ class Talker {
   void drop(Client& client);
   [[nodiscard]] Client* client_of(int socket);
   [[nodiscard]] std::string outputs_text() const;
-  void tell_state();
 
   TalkerParts parts_;
   std::vector<Client> clients_{};
