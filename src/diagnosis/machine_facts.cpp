@@ -5,6 +5,7 @@
 #include <set>
 
 #include "driver/sysfs.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::diagnosis {
 
@@ -46,9 +47,7 @@ std::string governors(const fs::path& root) {
       found.insert(name);
     }
   }
-  std::string text;
-  for (const std::string& name : found) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return found.empty() ? "none" : rig::joined({found.begin(), found.end()});
 }
 
 Finding kernel_finding(const MachineFacts& facts) {
