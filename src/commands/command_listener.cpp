@@ -2,8 +2,6 @@
 #include "commands/command_listener.hpp"
 
 #include <poll.h>
-#include <pthread.h>
-#include <signal.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 
@@ -12,6 +10,7 @@
 #include <utility>
 
 #include "rig/clean_text.hpp"
+#include "runtime/realtime_setup.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_url.hpp"
 
@@ -80,10 +79,7 @@ void CommandListener::listen() {
 }
 
 void CommandListener::listen_until(const std::stop_token& stop) {
-  // Only the main thread handles signals.
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  runtime::keep_signals_away();
   const Endpoint server = outlet_.provider() == "tcpq" ? endpoint_of(parse_lcm_url(outlet_.url())) : Endpoint{};
   while (!stop.stop_requested()) {
     const bool connected = file_descriptor() >= 0;
@@ -109,7 +105,7 @@ bool CommandListener::receive(int timeout_ms) {
     const UdpmReceiver::Arrival arrival = udpm_->next();
     dropped_by_kernel_.store(udpm_->dropped(), std::memory_order_relaxed);
     if (arrival.too_long) {
-      hand_over(Problem{too_long}, false);
+      hand_over(too_long, false);
     } else if (arrival.any) {
       take(arrival.payload);
     }
@@ -123,7 +119,7 @@ bool CommandListener::receive(int timeout_ms) {
   if (lcm_handle(lcm_) != 0) return false;
   if (!std::exchange(packet_.arrived, false)) return true;
   if (packet_.size > packet_.bytes.size()) {
-    hand_over(Problem{too_long}, false);
+    hand_over(too_long, false);
   } else {
     take(std::span(packet_.bytes).first(packet_.size));
   }
@@ -162,7 +158,7 @@ void CommandListener::on_packet(const lcm_recv_buf_t* received, const char* /*ch
 void CommandListener::take(std::span<const std::uint8_t> packet) {
   command_t command{};
   if (const std::string_view problem = decode_checked(packet, command); !problem.empty()) {
-    return hand_over(Problem{problem}, false);
+    return hand_over(problem, false);
   }
   const bool is_stop = command.command == "stop";
   hand_over(std::move(command), is_stop);
@@ -185,10 +181,9 @@ void CommandListener::hand_over(Arrival arrival, bool is_stop) {
 }
 
 void CommandListener::answer(const Arrival& arrival) {
-  if (const auto* problem = std::get_if<Problem>(&arrival)) {
+  if (const auto* problem = std::get_if<std::string_view>(&arrival)) {
     ++malformed_;
-    return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(problem->text), malformed_,
-               false);
+    return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(*problem), malformed_, false);
   }
   const auto& command = std::get<command_t>(arrival);
   const std::string from = " (sender '" + rig::clean_text(command.sender, shown_text_max_characters) + "')";

@@ -82,11 +82,8 @@ class CommandListener {
     std::size_t size{0};  ///< size received; larger than `bytes` if the packet did not fit
     bool arrived{false};
   };
-  /// What the answering thread gets instead of an undecodable packet.
-  struct Problem {
-    std::string_view text;
-  };
-  using Arrival = std::variant<Problem, command_t>;
+  /// A command, or what is wrong with a packet that is none.
+  using Arrival = std::variant<std::string_view, command_t>;
 
   static void on_packet(const lcm_recv_buf_t* received, const char* channel, void* self) noexcept;
   [[nodiscard]] int file_descriptor() noexcept { return udpm_ ? udpm_->file_descriptor() : lcm_get_fileno(lcm_); }

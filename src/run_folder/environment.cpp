@@ -30,10 +30,6 @@ std::string processor_model() {
   return "unknown";
 }
 
-}  // namespace
-
-namespace {
-
 struct System {
   std::string host{"unknown"};
   std::string kernel{"unknown"};

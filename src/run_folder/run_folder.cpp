@@ -100,17 +100,11 @@ fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::s
   return path;
 }
 
-namespace {
-
-constexpr std::size_t block_bytes = 262'144;
-
-}  // namespace
-
 std::string sha256_of_file(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   Sha256 sum;
-  std::vector<char> block(block_bytes);
+  std::vector<char> block(262'144);
   while (file) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     sum.add({block.data(), static_cast<std::size_t>(file.gcount())});
