@@ -54,8 +54,6 @@ class CommandListener {
   /// listen() it runs in the listening thread. With udpm the listener receives without liblcm (udpm_receiver.hpp) and
   /// also gets this process's own traffic. Throws LcmError if it cannot join udpm's multicast group.
   CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop);
-  CommandListener(const CommandListener&) = delete;
-  CommandListener& operator=(const CommandListener&) = delete;
   ~CommandListener();
 
   /// Sets the judge. Without one every command_t is refused as not enabled.

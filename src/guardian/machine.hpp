@@ -38,10 +38,6 @@ class SleepWatch {
  public:
   /// @param tell  called in the watch's thread
   explicit SleepWatch(std::function<void(const std::string&)> tell);
-  SleepWatch(const SleepWatch&) = delete;
-  SleepWatch& operator=(const SleepWatch&) = delete;
-  ~SleepWatch() = default;
-
   [[nodiscard]] Interruption interruption();
 
  private:
@@ -81,10 +77,6 @@ class MachinePause {
   /// of the thread that constructs it.
   /// @param found  called in its thread after each pause during a lease
   explicit MachinePause(std::function<void()> found);
-  MachinePause(const MachinePause&) = delete;
-  MachinePause& operator=(const MachinePause&) = delete;
-  ~MachinePause() = default;
-
   [[nodiscard]] bool works() const noexcept { return clock_.get() >= 0; }
   /// Use it only if it works. It refers to this object.
   [[nodiscard]] Interruption interruption();

@@ -79,9 +79,6 @@ struct HeldLease {
 class Talker {
  public:
   explicit Talker(TalkerParts parts) : parts_(std::move(parts)) {}
-  Talker(const Talker&) = delete;
-  Talker& operator=(const Talker&) = delete;
-
   /// Waits for something to happen, at most `timeout_ms`, and deals with it.
   void step(int timeout_ms);
 

@@ -8,7 +8,7 @@
 
 #include "abs_hil/message_fields.hpp"
 #include "abs_hil/rig/quantities.hpp"
-#include "replay/rerun.hpp"
+#include "replay/replay.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "replay/rerun.hpp"
+#include "replay/replay.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {

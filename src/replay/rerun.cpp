@@ -1,6 +1,4 @@
 // Feeds a recorded run through the cycle's parts again, cycle by cycle.
-#include "replay/rerun.hpp"
-
 #include <bit>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,6 +7,7 @@
 #include "config/config_error.hpp"
 #include "config/live_settings.hpp"
 #include "config/plan.hpp"
+#include "replay/replay.hpp"
 #include "rig/parse_json.hpp"
 #include "run/run.hpp"
 #include "telemetry/message_codec.hpp"
