@@ -1,5 +1,5 @@
 // Decides from heartbeats and stages when outputs must be made safe.
-#include "guardian/watchdog.hpp"
+#include "guardian/heartbeat.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // The guardian's watchdog over the cycles of a run, in virtual time.
-#include "guardian/watchdog.hpp"
+#include "guardian/heartbeat.hpp"
 
 #include "catch.hpp"
 
