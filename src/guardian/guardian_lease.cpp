@@ -35,8 +35,9 @@ constexpr std::int64_t state_within_ns = 2000 * rig::ns_per_ms;
 constexpr std::int64_t safe_within_ns = 300 * rig::ns_per_ms;
 
 std::string why_not(int error) {
-  if (error == EAGAIN) return "its queue of visitors is full";
-  return std::string(std::strerror(error)) + (error == EACCES ? ": join the group abs_hil and log in again" : "");
+  if (error == EAGAIN) return "its queue of visitors is full; end it and start it again";
+  return std::string(std::strerror(error)) +
+         (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket");
 }
 
 std::optional<ServiceAnswer> call(const std::string& path, const LeaseMessage& message, std::int64_t within_ns) {
@@ -82,11 +83,8 @@ std::unique_ptr<GuardianLease> GuardianLease::ask(const std::string& path, const
   driver::FileDescriptor socket(connect_to(path));
   if (socket.get() < 0) {
     if (errno == ENOENT || errno == ECONNREFUSED) return nullptr;
-    const int error = errno;
-    const std::string what = "cannot reach the resident service at " + path + ": ";
-    if (error == EAGAIN) refuse_run(what + "it accepts no connection; end it and start it again");
-    refuse_run(what + std::strerror(error) +
-               (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket"));
+    const std::string why = why_not(errno);
+    refuse_run("cannot reach the resident service at " + path + ": " + why);
   }
   const driver::FileDescriptor self(open_pidfd(::getpid()));
   if (self.get() < 0) refuse_run(std::string("cannot open a pidfd of this process: ") + std::strerror(errno));
