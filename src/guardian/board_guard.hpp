@@ -9,7 +9,7 @@
 #include "abs_hil/driver/safe_state_writer.hpp"
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
-#include "guardian/heartbeat.hpp"
+#include "guardian/watchdog.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::guardian {

@@ -8,7 +8,7 @@
 
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 #include "runtime/realtime_setup.hpp"
 #include "telemetry/message_stream.hpp"
 

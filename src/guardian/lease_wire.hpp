@@ -10,7 +10,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 

@@ -8,9 +8,13 @@
 #include <utility>
 
 #include "driver/file_descriptor.hpp"
-#include "guardian/heartbeat.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
+
+using runtime::GuardPage;
+using runtime::RunPage;
+using runtime::Stage;
 
 /// Memory that two processes share through a descriptor. It is sealed: neither can shrink it under the other.
 class SharedMemory {

@@ -11,7 +11,7 @@
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
 #include "runtime/clock.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 

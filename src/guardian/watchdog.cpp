@@ -1,5 +1,5 @@
 // Decides from heartbeats and stages when outputs must be made safe.
-#include "guardian/heartbeat.hpp"
+#include "guardian/watchdog.hpp"
 
 #include <algorithm>
 

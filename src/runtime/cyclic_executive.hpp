@@ -11,7 +11,7 @@
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"
 #include "runtime/cycle_statistics.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 #include "runtime/spsc_ring.hpp"
 
 namespace abs_hil::runtime {
@@ -56,7 +56,7 @@ class CyclicExecutive {
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
   /// Makes each cycle beat, feed the flight recorder, and latch a fault when the guardian is lost. `watch` must
   /// outlive the last step. Call it before the first step.
-  void set_watch(CycleWatch& watch) noexcept { watch_ = &watch; }
+  void set_watch(Heartbeat& watch) noexcept { watch_ = &watch; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
   /// Ends the run in order at the next cycle. Any thread or signal handler may call it. The first reason stays.
@@ -84,7 +84,7 @@ class CyclicExecutive {
   CycleLogic& logic_;
   CommandGate& gate_;
   RecordRing& ring_;
-  CycleWatch* watch_{nullptr};
+  Heartbeat* watch_{nullptr};
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;

@@ -1,5 +1,5 @@
 // The guardian's watchdog over the cycles of a run, in virtual time.
-#include "guardian/heartbeat.hpp"
+#include "guardian/watchdog.hpp"
 
 #include "catch.hpp"
 
