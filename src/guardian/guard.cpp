@@ -2,8 +2,8 @@
 #include "guardian/guard.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
@@ -27,7 +28,6 @@ namespace abs_hil::guardian {
 
 namespace {
 
-constexpr const char* ready_format = "ready %d %d:%n";
 constexpr int ready_within_ms = 5000;
 constexpr int ends_within_ms = 500;
 
@@ -118,10 +118,6 @@ void Guard::refuse_weaker(const runtime::Scheduling& guardian, const runtime::Sc
              program + "), or set a lower realtime.priority");
 }
 
-std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes) {
-  return rig::formatted("ready %d %d:", guardian.fifo_priority, guardian.memory_locked ? 1 : 0) + notes;
-}
-
 std::string to_json(const LaunchConfig& config) {
   const telemetry::ExperimentInfo& run = config.run;
   return nlohmann::json{{"config_json", run.config_json},
@@ -195,10 +191,12 @@ void GuardianProcess::arm(const runtime::Scheduling& controller) {
 }
 
 void GuardianProcess::start() {
-  std::array<int, 2> pipe{-1, -1};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse_for("cannot open a pipe", errno);
-  ready_ = driver::FileDescriptor(pipe[0]);
-  const auto ready = high_copy(driver::FileDescriptor(pipe[1]));
+  std::array<int, 2> ends{-1, -1};
+  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    refuse_for("cannot open a pair of sockets", errno);
+  }
+  ready_ = driver::FileDescriptor(ends[0]);
+  const auto ready = high_copy(driver::FileDescriptor(ends[1]));
   reset_page();
   const auto recorder = high_copy(recorder_.descriptor());
   const auto run_page = high_copy(pages().descriptors().run);
@@ -235,31 +233,16 @@ void GuardianProcess::start() {
 }
 
 runtime::Scheduling GuardianProcess::wait_until_ready() {
-  std::string said;
-  for (;;) {
-    pollfd readable{ready_.get(), POLLIN, 0};
-    const int ready = ::poll(&readable, 1, ready_within_ms);
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
-    std::array<char, 512> part{};
-    const ssize_t got = ::read(ready_.get(), part.data(), part.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) break;
-    said.append(part.data(), static_cast<std::size_t>(got));
+  if (!is_readable(ready_.get(), ready_within_ms)) {
+    refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
   }
-  constexpr std::string_view ready_word = "ready ";
-  constexpr std::string_view error_word = "error ";
-  if (said.starts_with(error_word)) refuse_run(said.substr(error_word.size()));
-  if (!said.starts_with(ready_word)) refuse_run(program_ + " ended before it was ready");
-  runtime::Scheduling has;
-  int locked = 0;
-  int notes_at = 0;
-  if (std::sscanf(said.c_str(), ready_format, &has.fifo_priority, &locked, &notes_at) < 2 || notes_at == 0) {
-    refuse_run(program_ + " comes from another build of abs_hil");
-  }
-  has.memory_locked = locked != 0;
-  notes_ = said.substr(static_cast<std::size_t>(notes_at));
-  return has;
+  char first = 0;
+  if (::recv(ready_.get(), &first, 1, MSG_PEEK) <= 0) refuse_run(program_ + " ended before it was ready");
+  const auto said = receive_message(ready_.get(), 0);
+  if (said && said->word == LeaseWord::refused) refuse_run(said->text);
+  if (!said || said->word != LeaseWord::ready) refuse_run(program_ + " comes from another build of abs_hil");
+  notes_ = said->text;
+  return said->scheduling;
 }
 
 bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !has_ended(process_.get()); }

@@ -78,16 +78,13 @@ void write_flight_files(const LaunchConfig& launch, const std::string& channel_p
 /// The file descriptors that the guardian inherits. Besides these it has only stdin, stdout (both /dev/null) and
 /// stderr.
 enum InheritedDescriptor : int {
-  inherited_recorder = 3,    ///< SharedRecorder
-  inherited_controller = 4,  ///< pidfd of the controller
-  inherited_ready = 5,  ///< pipe to the controller: the guardian writes once what `ready_text` makes, or "error WHAT"
+  inherited_recorder = 3,       ///< SharedRecorder
+  inherited_controller = 4,     ///< pidfd of the controller
+  inherited_ready = 5,          ///< socket to the controller: the guardian sends one LeaseMessage, `ready` or `refused`
   inherited_launch_config = 6,  ///< LaunchConfig as JSON, read from offset 0
   inherited_run_page = 7,       ///< both of Pages
   inherited_guard_page = 8,
 };
-
-/// What a guardian that stands by tells its controller.
-[[nodiscard]] std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes);
 
 /// Path of the guardian's program: abs_guardian in the folder of the running program, otherwise the installed one.
 [[nodiscard]] std::string guardian_program();

@@ -17,6 +17,7 @@
 #include "guardian/guard.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
+#include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
 #include "runtime/board_policy.hpp"
 
@@ -28,8 +29,8 @@ namespace {
 std::atomic<bool> released_by_person{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-void tell_controller(const std::string& text) {
-  [[maybe_unused]] const auto written = ::write(inherited_ready, text.data(), text.size());
+void tell_controller(const LeaseMessage& message) {
+  static_cast<void>(send_message(inherited_ready, message));
   ::close(inherited_ready);
 }
 
@@ -79,7 +80,9 @@ int guard() {
                     .released = &released_by_person});
   guard.cover_only(std::move(pages), inherited_controller);
   const bool lacks = setup.launch.realtime == runtime::RealtimeMode::prefer && !realtime.realtime();
-  tell_controller(ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
+  tell_controller({.word = LeaseWord::ready,
+                   .scheduling = realtime.scheduling,
+                   .text = lacks ? realtime.shortcomings() : std::string()});
 
   run_guard(guard, clock, [] {});
   const GuardianReport& report = guard.report();
@@ -121,7 +124,7 @@ int guard_one_run() {
   try {
     return guard();
   } catch (const std::exception& error) {
-    tell_controller(std::string("error ") + error.what());
+    tell_controller({.word = LeaseWord::refused, .text = error.what()});
     return exit_not_started;
   }
 }

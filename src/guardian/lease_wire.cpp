@@ -61,13 +61,7 @@ bool send_message(int socket, const LeaseMessage& message, std::initializer_list
 }
 
 std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
-  pollfd readable{socket, POLLIN, 0};
-  int ready = 0;
-  do {
-    ready = ::poll(&readable, 1, timeout_ms);
-  } while (ready < 0 && errno == EINTR);
-  if (ready <= 0) return std::nullopt;
-
+  if (!is_readable(socket, timeout_ms)) return std::nullopt;
   LeaseHeader header{};
   std::string text(longest_text, '\0');
   std::array<iovec, 2> parts{iovec{&header, sizeof header}, iovec{text.data(), text.size()}};

@@ -41,11 +41,11 @@ int LinuxProcesses::open(pid_t pid) noexcept {
   return -1;
 }
 
-bool has_ended(int pidfd, int timeout_ms) noexcept {
-  pollfd ended{pidfd, POLLIN, 0};
+bool is_readable(int fd, int timeout_ms) noexcept {
+  pollfd readable{fd, POLLIN, 0};
   int ready = 0;
   do {
-    ready = ::poll(&ended, 1, timeout_ms);  // POLLNVAL: there is no process
+    ready = ::poll(&readable, 1, timeout_ms);  // POLLNVAL: there is nothing
   } while (ready < 0 && errno == EINTR);
   return ready > 0;
 }
