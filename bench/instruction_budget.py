@@ -27,7 +27,6 @@ BUDGETS = [
     # They may grow by 15 % over that, to 447, and by 9 for the overspeed that the counts alone show.
     ('plausibility of the measurement', ['counted_watch'], 315),
     ('gate: check of the command', ['abs_hil::runtime::CommandGate::check(*'], 141),
-    # 400 until they stood behind an interface, so that the cycle need not know of guardians (two virtual calls, some 15).
     ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 430),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),

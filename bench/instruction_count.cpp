@@ -7,8 +7,8 @@
 
 #include "driver/sim/sim_driver.hpp"
 #include "experiment/simulated_run.hpp"
-#include "guardian/heartbeat.hpp"
 #include "runtime/cyclic_executive.hpp"
+#include "runtime/heartbeat.hpp"
 
 using namespace abs_hil;
 
@@ -37,7 +37,7 @@ extern "C" {
 }
 
 /// Heartbeat, check of the guardian's heartbeat, and flight recorder.
-[[gnu::noipa]] bool counted_watchers(runtime::CycleWatch& watch, const rig::CycleRecord& record) {
+[[gnu::noipa]] bool counted_watchers(runtime::Heartbeat& watch, const rig::CycleRecord& record) {
   const runtime::GuardianSign guardian = watch.beat();
   watch.keep(record);
   return guardian.reason != rig::Reason::none;
@@ -60,9 +60,9 @@ int main(int argc, char** argv) {
   runtime::RecordRing ring(64);
   std::vector<runtime::FlightSlot> slots(2000);
   runtime::FlightRing recorder(slots);
-  guardian::RunPage page;
-  const guardian::GuardPage guard_page;
-  guardian::Heartbeat watch(page, guard_page, recorder, 1'000'000);
+  runtime::RunPage page;
+  const runtime::GuardPage guard_page;
+  runtime::Heartbeat watch(page, guard_page, recorder, 1'000'000);
   const auto statistics = std::make_unique<runtime::CycleStatistics>();
 
   rig::Measurement measurement;

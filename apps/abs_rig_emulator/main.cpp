@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "cli/command_line.hpp"
-#include "cli/standard_output.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"

@@ -1,9 +1,15 @@
-// Carries out the rows of a command line with CLI11.
+// Carries out the rows of a command line with CLI11, and tells of results that standard output has lost.
 #include "cli/command_line.hpp"
+
+#include <poll.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <iostream>
 #include <type_traits>
 
@@ -50,7 +56,6 @@ void limit_values(CLI::Option& option, const Option& row) {
   } else if (!row.one_of.empty()) {
     option.check(CLI::IsMember(row.one_of));
   }
-  if (!row.words.empty()) option.transform(CLI::CheckedTransformer(row.words));
 }
 
 /// The first word that the command line should not have, and the valid one that is nearest to it.
@@ -84,7 +89,6 @@ void Parser::add(const Option& row) {
   CLI::Option& option = *bind(*app_, row);
   limit_values(option, row);
   if (!row.type.empty()) option.type_name(row.type);
-  if (row.delimiter != '\0') option.delimiter(row.delimiter);
   if (row.count.most > 0) option.expected(row.count.least, row.count.most);
   if (row.repeated) option.allow_extra_args(false);
   if (row.required) option.required();
@@ -137,6 +141,17 @@ std::vector<std::string> Parser::given() const {
     if (option->count() > 0) names.push_back(option->get_name());
   }
   return names;
+}
+
+int with_stdout(const char* program, int status) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  const int why = errno;
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  if (::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0) return status;
+  std::fprintf(stderr, "%s: cannot write to standard output%s%s\n", program, why != 0 ? ": " : "",
+               why != 0 ? std::strerror(why) : "");
+  return status == 0 ? 1 : status;
 }
 
 }  // namespace abs_hil::cli

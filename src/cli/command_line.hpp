@@ -46,19 +46,17 @@ struct Option {
   std::string names;  ///< "--rate" or "-r,--rate"; without dashes, an argument known by its place
   Target to;          ///< a bool makes the option a flag, which takes no value
   std::string help;
-  bool sets{true};                                   ///< the value that a flag gives its target
-  std::string type{};                                ///< name of the value in the help; empty: that of its type
-  Range range{};                                     ///< of integers unless the target is a double
-  std::vector<std::string> one_of{};                 ///< valid values; empty: any
-  std::vector<std::pair<std::string, int>> words{};  ///< words for numbers; only these words and numbers are valid
-  char delimiter{'\0'};                              ///< splits one argument into several values
-  Count count{};                                     ///< of values
-  bool repeated{false};                              ///< takes one value each time; without it, all that follow
-  bool required{false};                              ///< the command line must have it
-  bool show_default{false};                          ///< the help shows the target's value at this moment
-  std::string default_text{};                        ///< the help shows this as the default
-  std::vector<std::string> needs{};                  ///< names of options that must be given with it
-  std::vector<std::string> excludes{};               ///< names of options that must not
+  bool sets{true};                      ///< the value that a flag gives its target
+  std::string type{};                   ///< name of the value in the help; empty: that of its type
+  Range range{};                        ///< of integers unless the target is a double
+  std::vector<std::string> one_of{};    ///< valid values; empty: any
+  Count count{};                        ///< of values
+  bool repeated{false};                 ///< takes one value each time; without it, all that follow
+  bool required{false};                 ///< the command line must have it
+  bool show_default{false};             ///< the help shows the target's value at this moment
+  std::string default_text{};           ///< the help shows this as the default
+  std::vector<std::string> needs{};     ///< names of options that must be given with it
+  std::vector<std::string> excludes{};  ///< names of options that must not
 };
 
 /// What a program, a subcommand or a group of options reads from a command line. A copy is the same parser.
@@ -95,5 +93,9 @@ class Parser {
 
   std::shared_ptr<CLI::App> app_{};
 };
+
+/// Flushes standard output at the end of a program. Results that did not reach it are lost data: a message on stderr,
+/// and 1 in place of status 0. A reader or a terminal that has gone wanted no more.
+[[nodiscard]] int with_stdout(const char* program, int status);
 
 }  // namespace abs_hil::cli

@@ -25,9 +25,29 @@ namespace {
 
 constexpr std::size_t key_min_characters = 16;
 constexpr std::size_t session_bytes = 16;
+constexpr std::string_view tag_begin = " [mac ";
+constexpr std::string_view tag_end = "]";
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
   throw config::ConfigError("commands.key_file: '" + file.string() + "' " + why);
+}
+
+template <class Message>
+std::string hmac_of(const Message& message, const std::string& key) {
+  telemetry::EncodeBuffer buffer;
+  const auto bytes = buffer.encode(message);
+  std::array<unsigned char, EVP_MAX_MD_SIZE> mac{};
+  unsigned int size = 0;
+  if (HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes.data(), bytes.size(), mac.data(), &size) ==
+      nullptr) {
+    throw std::runtime_error("OpenSSL cannot make an HMAC-SHA-256");
+  }
+  return telemetry::hexadecimal(std::span(mac).first(size));
+}
+
+/// In constant time: the duration must not reveal how much of a guess was right.
+bool same(std::string_view given, std::string_view expected) {
+  return given.size() == expected.size() && CRYPTO_memcmp(given.data(), expected.data(), expected.size()) == 0;
 }
 
 }  // namespace
@@ -52,31 +72,6 @@ std::string read_key(const std::filesystem::path& file) {
   if (key.size() < key_min_characters) refuse(file, "holds fewer than 16 characters" + make_one);
   return key;
 }
-
-namespace {
-
-constexpr std::string_view tag_begin = " [mac ";
-constexpr std::string_view tag_end = "]";
-
-template <class Message>
-std::string hmac_of(const Message& message, const std::string& key) {
-  telemetry::EncodeBuffer buffer;
-  const auto bytes = buffer.encode(message);
-  std::array<unsigned char, EVP_MAX_MD_SIZE> mac{};
-  unsigned int size = 0;
-  if (HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes.data(), bytes.size(), mac.data(), &size) ==
-      nullptr) {
-    throw std::runtime_error("OpenSSL cannot make an HMAC-SHA-256");
-  }
-  return telemetry::hexadecimal(std::span(mac).first(size));
-}
-
-/// In constant time: the duration must not reveal how much of a guess was right.
-bool same(std::string_view given, std::string_view expected) {
-  return given.size() == expected.size() && CRYPTO_memcmp(given.data(), expected.data(), expected.size()) == 0;
-}
-
-}  // namespace
 
 std::string mac_of(const command_t& command, const std::string& key) {
   command_t bare = command;

@@ -2,18 +2,15 @@
 #include "commands/command_listener.hpp"
 
 #include <poll.h>
-#include <pthread.h>
-#include <signal.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 
 #include <chrono>
-#include <cstring>
 #include <utility>
 
 #include "rig/clean_text.hpp"
+#include "runtime/realtime_setup.hpp"
 #include "telemetry/checked_decode.hpp"
-#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -23,10 +20,7 @@ constexpr std::size_t most_waiting = 64;
 constexpr int answers_per_second = 10;
 constexpr std::size_t shown_text_max_characters = 64;
 constexpr int thread_wait_ms = 50;
-constexpr std::chrono::seconds reconnect_after{1};
 constexpr int tcpq_timeout_ms = 200;
-/// LCM's default queue holds 30 messages, and a flood would push a stop out of it.
-constexpr int lcm_queue_capacity = 1024;
 constexpr std::string_view too_long = "too long for a command";
 
 }  // namespace
@@ -40,26 +34,15 @@ CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::
     listening_ = true;
     return;
   }
+  Receiver::Take take_packet = [this](const std::string&, std::span<const std::uint8_t> packet) {
+    packet.size() > UdpmReceiver::payload_max ? hand_over(too_long, false) : take(packet);
+  };
   if (outlet_.provider() == "memq") {
-    lcm_ = outlet_.lcm().getUnderlyingLCM();
+    receiver_.emplace(outlet_, stream_.command_channel(), std::move(take_packet));
   } else {
-    own_lcm_ = std::make_unique<lcm::LCM>(outlet_.url());
-    if (!own_lcm_->good()) return;
-    lcm_ = own_lcm_->getUnderlyingLCM();
+    receiver_.emplace(outlet_.url(), stream_.command_channel(), std::move(take_packet));
   }
-  subscribe();
   listening_ = true;
-}
-
-void CommandListener::subscribe() {
-  subscription_ = lcm_subscribe(lcm_, stream_.command_channel().c_str(), &on_packet, this);
-  lcm_subscription_set_queue_capacity(subscription_, lcm_queue_capacity);
-}
-
-CommandListener::~CommandListener() {
-  end_thread();
-  // An own LCM object unsubscribes by itself; with tcpq an explicit call would search for the server again.
-  if (!own_lcm_ && subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
 }
 
 void CommandListener::end_thread() {
@@ -80,36 +63,22 @@ void CommandListener::listen() {
 }
 
 void CommandListener::listen_until(const std::stop_token& stop) {
-  // Only the main thread handles signals.
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
-  const Endpoint server = outlet_.provider() == "tcpq" ? endpoint_of(parse_lcm_url(outlet_.url())) : Endpoint{};
+  runtime::keep_signals_away();
   while (!stop.stop_requested()) {
-    const bool connected = file_descriptor() >= 0;
-    if (receive(thread_wait_ms) || connected) continue;
-    // The tcpq server is away: look for it no more often than publishing does.
-    for (auto waited = std::chrono::milliseconds(0); waited < reconnect_after && !stop.stop_requested();
-         waited += std::chrono::milliseconds(thread_wait_ms)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(thread_wait_ms));
-    }
-    if (stop.stop_requested() || ask_tcpq_server(server, tcpq_timeout_ms) != TcpqServer::answers) continue;
-    // Subscribing connects again. lcm_handle would connect too, but then wait for a message without a time limit.
-    lcm_unsubscribe(lcm_, subscription_);
-    subscribe();
+    if (receive(thread_wait_ms) || file_descriptor() >= 0) continue;
+    receiver_->poll(1);  // the tcpq server is away: this looks for it once a second
+    std::this_thread::sleep_for(std::chrono::milliseconds(thread_wait_ms));
   }
 }
 
 bool CommandListener::receive(int timeout_ms) {
-  // lcm_handle_timeout does not work here: its select() cannot handle a descriptor of -1 (tcpq without server) or above
-  // 1023.
   pollfd ready{file_descriptor(), POLLIN, 0};
   if (ready.fd < 0 || ::poll(&ready, 1, timeout_ms) <= 0) return false;
   if (udpm_) {
     const UdpmReceiver::Arrival arrival = udpm_->next();
     dropped_by_kernel_.store(udpm_->dropped(), std::memory_order_relaxed);
     if (arrival.too_long) {
-      hand_over(Problem{too_long}, false);
+      hand_over(too_long, false);
     } else if (arrival.any) {
       take(arrival.payload);
     }
@@ -120,13 +89,7 @@ bool CommandListener::receive(int timeout_ms) {
     constexpr timeval timeout{.tv_sec = 0, .tv_usec = suseconds_t{tcpq_timeout_ms} * 1000};
     static_cast<void>(::setsockopt(ready.fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout));
   }
-  if (lcm_handle(lcm_) != 0) return false;
-  if (!std::exchange(packet_.arrived, false)) return true;
-  if (packet_.size > packet_.bytes.size()) {
-    hand_over(Problem{too_long}, false);
-  } else {
-    take(std::span(packet_.bytes).first(packet_.size));
-  }
+  receiver_->poll(1);
   return true;
 }
 
@@ -151,18 +114,10 @@ void CommandListener::answer_waiting(std::size_t at_most) {
   }
 }
 
-// Only copies the packet: publishing an answer may throw, and must not throw through LCM's C code.
-void CommandListener::on_packet(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) noexcept {
-  Packet& packet = static_cast<CommandListener*>(self)->packet_;
-  packet.size = received->data_size;
-  packet.arrived = true;
-  if (packet.size <= packet.bytes.size()) std::memcpy(packet.bytes.data(), received->data, packet.size);
-}
-
 void CommandListener::take(std::span<const std::uint8_t> packet) {
   command_t command{};
   if (const std::string_view problem = decode_checked(packet, command); !problem.empty()) {
-    return hand_over(Problem{problem}, false);
+    return hand_over(problem, false);
   }
   const bool is_stop = command.command == "stop";
   hand_over(std::move(command), is_stop);
@@ -185,10 +140,9 @@ void CommandListener::hand_over(Arrival arrival, bool is_stop) {
 }
 
 void CommandListener::answer(const Arrival& arrival) {
-  if (const auto* problem = std::get_if<Problem>(&arrival)) {
+  if (const auto* problem = std::get_if<std::string_view>(&arrival)) {
     ++malformed_;
-    return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(problem->text), malformed_,
-               false);
+    return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(*problem), malformed_, false);
   }
   const auto& command = std::get<command_t>(arrival);
   const std::string from = " (sender '" + rig::clean_text(command.sender, shown_text_max_characters) + "')";

@@ -1,14 +1,10 @@
 #pragma once
 
-#include <lcm/lcm.h>
-
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -19,6 +15,7 @@
 #include "abs_hil/command_t.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_stream.hpp"
+#include "telemetry/receiver.hpp"
 #include "telemetry/udpm_receiver.hpp"
 
 namespace abs_hil::telemetry {
@@ -54,9 +51,6 @@ class CommandListener {
   /// listen() it runs in the listening thread. With udpm the listener receives without liblcm (udpm_receiver.hpp) and
   /// also gets this process's own traffic. Throws LcmError if it cannot join udpm's multicast group.
   CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop);
-  CommandListener(const CommandListener&) = delete;
-  CommandListener& operator=(const CommandListener&) = delete;
-  ~CommandListener();
 
   /// Sets the judge. Without one every command_t is refused as not enabled.
   void set_judge(CommandJudge judge) { judge_ = std::move(judge); }
@@ -75,26 +69,16 @@ class CommandListener {
   [[nodiscard]] Counts counts() const noexcept;
 
  private:
-  static constexpr std::size_t max_packet_bytes = UdpmReceiver::payload_max;
-  /// A packet as liblcm delivered it.
-  struct Packet {
-    std::array<std::uint8_t, max_packet_bytes> bytes{};
-    std::size_t size{0};  ///< size received; larger than `bytes` if the packet did not fit
-    bool arrived{false};
-  };
-  /// What the answering thread gets instead of an undecodable packet.
-  struct Problem {
-    std::string_view text;
-  };
-  using Arrival = std::variant<Problem, command_t>;
+  /// A command, or what is wrong with a packet that is none.
+  using Arrival = std::variant<std::string_view, command_t>;
 
-  static void on_packet(const lcm_recv_buf_t* received, const char* channel, void* self) noexcept;
-  [[nodiscard]] int file_descriptor() noexcept { return udpm_ ? udpm_->file_descriptor() : lcm_get_fileno(lcm_); }
+  [[nodiscard]] int file_descriptor() noexcept {
+    return udpm_ ? udpm_->file_descriptor() : receiver_->file_descriptor();
+  }
   /// Waits up to `timeout_ms` for one packet and handles it. Returns false if none came or the link is down.
   bool receive(int timeout_ms);
   void take(std::span<const std::uint8_t> packet);
   void hand_over(Arrival arrival, bool is_stop);
-  void subscribe();
   void end_thread();
   void answer_waiting(std::size_t at_most);
   void listen_until(const std::stop_token& stop);
@@ -106,13 +90,10 @@ class CommandListener {
   std::function<void()> on_stop_;
   CommandJudge judge_;
   std::optional<UdpmReceiver> udpm_;
-  /// Used by all providers but udpm. It is separate from the outlet's object, so that incoming floods cannot delay
-  /// outgoing messages; only memq:// shares the outlet's object, because it delivers within one object only.
-  std::unique_ptr<lcm::LCM> own_lcm_;
-  lcm_t* lcm_{nullptr};
-  lcm_subscription_t* subscription_{nullptr};
+  /// Of all providers but udpm. It is separate from the outlet, so that incoming floods cannot delay outgoing messages;
+  /// only that of memq:// shares it.
+  std::optional<Receiver> receiver_;
   bool listening_{false};
-  Packet packet_{};
   std::mutex mutex_;  ///< guards `arrivals_` between the listening and the answering thread
   std::deque<Arrival> arrivals_;
   std::atomic<std::uint64_t> stops_{0};
@@ -123,7 +104,7 @@ class CommandListener {
   std::uint64_t malformed_{0};
   double answer_window_start_s_{0.0};
   int answers_in_window_{0};
-  std::jthread thread_;
+  std::jthread thread_;  ///< the last member: it ends first
 };
 
 }  // namespace abs_hil::telemetry

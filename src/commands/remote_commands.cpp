@@ -18,7 +18,10 @@ constexpr std::size_t shown_max_characters = 64;
 constexpr std::string_view start_name = "start";
 constexpr std::string_view continue_name = "continue";
 
-bool has_value(const std::string& key) { return key != start_name && key != continue_name; }
+/// A change in words.
+std::string change_text(const std::string& key, double value) {
+  return key == start_name || key == continue_name ? key : fmt::format("{} = {}", key, value);
+}
 
 std::string shown(const std::string& text) { return rig::clean_text(text, shown_max_characters); }
 
@@ -106,8 +109,9 @@ void RemoteCommands::settle(rig::Reason reason, std::map<std::uint32_t, Pending>
   ++accepted_;
   // The stream tells of every answer itself, also of one at the terminal.
   if (done.key != continue_name) stream_.send_adjustment(done.key, done.value);
-  const std::string what = has_value(done.key) ? fmt::format("{} = {}", done.key, done.value) : done.key;
-  stream_.answer_command(reason, fmt::format("accepted: {} (sender '{}')", what, shown(done.sender)), done.value);
+  stream_.answer_command(
+      reason, fmt::format("accepted: {} (sender '{}')", change_text(done.key, done.value), shown(done.sender)),
+      done.value);
   pending_.erase(pending);
 }
 
@@ -123,10 +127,9 @@ void RemoteCommands::refuse_pending() {
   over_ = true;
   for (const auto& [number, pending] : pending_) {
     ++refused_at_end_;
-    const std::string what = has_value(pending.key) ? fmt::format("{} = {}", pending.key, pending.value) : pending.key;
     stream_.answer_command(rig::Reason::command_not_now,
-                           fmt::format("refused: {}: the run ended before it could take effect (sender '{}')", what,
-                                       shown(pending.sender)),
+                           fmt::format("refused: {}: the run ended before it could take effect (sender '{}')",
+                                       change_text(pending.key, pending.value), shown(pending.sender)),
                            pending.value);
   }
   pending_.clear();

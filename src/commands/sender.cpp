@@ -17,6 +17,7 @@
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_codec.hpp"
+#include "telemetry/receiver.hpp"
 
 namespace abs_hil::commands {
 
@@ -40,17 +41,11 @@ std::string problem_of(const command_state_t& state) {
 /// Collects the answers of one running program.
 class Answers {
  public:
-  Answers(lcm_t* lcm, const std::string& prefix, std::string sender, std::string key)
-      : lcm_(lcm), sender_(std::move(sender)), key_(std::move(key)) {
-    events_ = lcm_subscribe(lcm_, (prefix + "EVENT").c_str(), &on_event, this);
-    states_ = lcm_subscribe(lcm_, (prefix + "COMMAND_STATE").c_str(), &on_state, this);
-  }
-  Answers(const Answers&) = delete;
-  Answers& operator=(const Answers&) = delete;
-  ~Answers() {
-    lcm_unsubscribe(lcm_, events_);
-    lcm_unsubscribe(lcm_, states_);
-  }
+  Answers(telemetry::LcmOutlet& network, const std::string& prefix, std::string sender, std::string key)
+      : sender_(std::move(sender)),
+        key_(std::move(key)),
+        receiver_(network, prefix + "(EVENT|COMMAND_STATE)",
+                  [this](const std::string&, std::span<const std::uint8_t> packet) { take(packet); }) {}
 
   /// Receives messages until `until`, or until `enough` returns true.
   template <class Enough>
@@ -58,8 +53,8 @@ class Answers {
     while (!enough()) {
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
       if (left <= 0) return;
-      pollfd ready{lcm_get_fileno(lcm_), POLLIN, 0};
-      if (::poll(&ready, 1, static_cast<int>(left)) > 0 && lcm_handle(lcm_) != 0) return;
+      pollfd ready{receiver_.file_descriptor(), POLLIN, 0};
+      if (::poll(&ready, 1, static_cast<int>(left)) > 0) receiver_.poll(1);
     }
   }
 
@@ -72,36 +67,28 @@ class Answers {
   std::string unusable{};  ///< why no command can be made for the latest of the other states
 
  private:
-  static std::span<const std::uint8_t> bytes(const lcm_recv_buf_t* received) {
-    return {static_cast<const std::uint8_t*>(received->data), received->data_size};
-  }
-  static void on_event(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
-    auto& answers = *static_cast<Answers*>(self);
-    event_t event{};
-    if (!telemetry::decode_checked(bytes(received), event).empty()) return;
-    const bool last_phase = event.phase == telemetry_t::PHASE_STOPPED || event.phase == telemetry_t::PHASE_FAULT;
-    if (last_phase && event.kind != "command") answers.ending = event;
-    if (event.kind != "command") return;
-    if (event.message.find('\'' + answers.sender_ + '\'') == std::string::npos) return;
-    const bool counts = answers.key_.empty() || take_tag(event, answers.key_);
-    (counts ? answers.answer : answers.without_tag) = std::move(event);
-  }
-  static void on_state(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
-    auto& answers = *static_cast<Answers*>(self);
-    command_state_t state{};
-    if (!telemetry::decode_checked(bytes(received), state).empty()) return;
-    if (std::string problem = problem_of(state); problem.empty()) {
-      answers.state = std::move(state);
+  void take(std::span<const std::uint8_t> packet) {
+    if (event_t event{}; telemetry::decode_checked(packet, event).empty()) return take_event(std::move(event));
+    command_state_t received{};
+    if (!telemetry::decode_checked(packet, received).empty()) return;
+    if (std::string problem = problem_of(received); problem.empty()) {
+      state = std::move(received);
     } else {
-      answers.unusable = std::move(problem);
+      unusable = std::move(problem);
     }
   }
+  void take_event(event_t event) {
+    const bool last_phase = event.phase == telemetry_t::PHASE_STOPPED || event.phase == telemetry_t::PHASE_FAULT;
+    if (last_phase && event.kind != "command") ending = event;
+    if (event.kind != "command") return;
+    if (event.message.find('\'' + sender_ + '\'') == std::string::npos) return;
+    const bool counts = key_.empty() || take_tag(event, key_);
+    (counts ? answer : without_tag) = std::move(event);
+  }
 
-  lcm_t* lcm_;
   std::string sender_;
   std::string key_;  ///< empty: every answer counts
-  lcm_subscription_t* events_;
-  lcm_subscription_t* states_;
+  telemetry::Receiver receiver_;
 };
 
 std::string unique_sender() {
@@ -145,7 +132,7 @@ Reply send(const Order& order, const SenderOptions& options) {
   lcm_t* const lcm = outlet.lcm().getUnderlyingLCM();
   const std::string sender = unique_sender();
   const std::string channel = options.channel_prefix + "COMMAND";
-  Answers answers(lcm, options.channel_prefix, sender, key);
+  Answers answers(outlet, options.channel_prefix, sender, key);
   const auto end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.timeout_s));
   const auto answered = [&answers] { return answers.answer.has_value(); };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 namespace abs_hil::diagnosis {
@@ -20,32 +21,23 @@ std::string indented(std::string_view text, std::string_view indent) {
   return out;
 }
 
-std::string_view mark(Standing standing) {
-  switch (standing) {
-    case Standing::good: return "ok  ";
-    case Standing::note: return "note";
-    case Standing::warning: return "WARN";
-    case Standing::failure: return "FAIL";
-  }
-  return "?";
+/// A standing's mark in a text, and its name.
+struct StandingWords {
+  std::string_view mark;
+  std::string_view name;
+};
+StandingWords words_of(Standing standing) {
+  constexpr std::array<StandingWords, 4> rows{
+      {{"ok  ", "ok"}, {"note", "note"}, {"WARN", "warning"}, {"FAIL", "failure"}}};
+  return rows[static_cast<std::size_t>(standing)];
 }
 
 }  // namespace
 
-std::string_view name_of(Standing standing) noexcept {
-  switch (standing) {
-    case Standing::good: return "ok";
-    case Standing::note: return "note";
-    case Standing::warning: return "warning";
-    case Standing::failure: return "failure";
-  }
-  return "unknown";
-}
-
 std::string to_text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& f : findings) {
-    text += fmt::format("{}  {}{}{}\n", mark(f.standing), f.what, f.detail.empty() ? "" : ": ", f.detail);
+    text += fmt::format("{}  {}{}{}\n", words_of(f.standing).mark, f.what, f.detail.empty() ? "" : ": ", f.detail);
     if (!f.fix.empty()) text += fmt::format("      fix:\n{}\n", indented(f.fix, "        "));
   }
   return text;
@@ -56,7 +48,7 @@ nlohmann::ordered_json to_json(std::span<const Finding> findings) {
   for (const Finding& f : findings) {
     list.push_back({{"check", f.check},
                     {"what", f.what},
-                    {"standing", std::string(name_of(f.standing))},
+                    {"standing", std::string(words_of(f.standing).name)},
                     {"detail", f.detail},
                     {"fix", f.fix}});
   }

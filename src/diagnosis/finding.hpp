@@ -4,7 +4,6 @@
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
-#include <string_view>
 
 namespace abs_hil::diagnosis {
 
@@ -20,7 +19,6 @@ struct Finding {
   std::string fix{};     ///< commands or advice, one per line; empty if no action is needed
 };
 
-[[nodiscard]] std::string_view name_of(Standing standing) noexcept;
 /// One line per finding, with detail and fix below it.
 [[nodiscard]] std::string to_text(std::span<const Finding> findings);
 [[nodiscard]] nlohmann::ordered_json to_json(std::span<const Finding> findings);

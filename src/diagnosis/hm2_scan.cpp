@@ -135,29 +135,22 @@ Finding judge_round_trips(std::vector<double> times_us, int asked, int foreign) 
 }
 
 Finding judge_arp(const std::string& table, const std::string& address, const std::string& interface) {
-  Finding f{.check = "hm2", .what = "ARP entry of " + address, .standing = Standing::warning};
+  Finding f{.check = "hm2", .what = "ARP entry of " + address, .standing = Standing::warning, .detail = "none"};
   std::string mac = "MAC";
   std::istringstream lines(table);
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream words(line);
-    std::string ip;
-    std::string type;
-    std::string flags;
-    words >> ip >> type >> flags >> mac;
+  for (std::string line, ip, type, flags, found; std::getline(lines, line);) {
+    std::istringstream(line) >> ip >> type >> flags >> found;
     if (ip != address) continue;
     constexpr unsigned long permanent = 0x4;
-    f.detail = mac;
     if ((std::strtoul(flags.c_str(), nullptr, 16) & permanent) != 0) {
-      f.standing = Standing::good;
-      f.detail += ", permanent";
-      return f;
+      return {.check = f.check, .what = f.what, .detail = found + ", permanent"};
     }
-    f.detail += ", not permanent: the kernel asks again from time to time, and a cycle then waits for that answer, too";
-    f.fix = fmt::format("sudo ip neigh replace {} lladdr {} nud permanent dev {}", address, mac, interface);
-    return f;
+    mac = found;
+    f.detail =
+        mac + ", not permanent: the kernel asks again from time to time, and a cycle then waits for that answer, too";
+    break;
   }
-  f.detail = "none";
-  f.fix = fmt::format("sudo ip neigh replace {} lladdr MAC nud permanent dev {}", address, interface);
+  f.fix = fmt::format("sudo ip neigh replace {} lladdr {} nud permanent dev {}", address, mac, interface);
   return f;
 }
 

@@ -4,12 +4,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 namespace abs_hil::diagnosis {
 
 namespace {
+
+std::string_view name_of(Grade grade) {
+  constexpr std::array<std::string_view, 4> names{"very good", "good", "usable", "unfit"};
+  return names[static_cast<std::size_t>(grade)];
+}
 
 Grade grade_jitter(double worst_us) noexcept {
   if (worst_us < 20.0) return Grade::very_good;
@@ -37,16 +44,6 @@ nlohmann::ordered_json quantiles_json(const rig::DurationQuantiles& q) {
 }
 
 }  // namespace
-
-std::string_view name_of(Grade grade) noexcept {
-  switch (grade) {
-    case Grade::very_good: return "very good";
-    case Grade::good: return "good";
-    case Grade::usable: return "usable";
-    case Grade::unfit: return "unfit";
-  }
-  return "unknown";
-}
 
 Verdict judge(const LatencyRun& run) noexcept {
   Verdict v;

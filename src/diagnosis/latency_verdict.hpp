@@ -22,7 +22,6 @@ struct LatencyRun {
 
 /// Grades of a computer's timing.
 enum class Grade : std::uint8_t { very_good, good, usable, unfit };
-[[nodiscard]] std::string_view name_of(Grade grade) noexcept;
 
 /// A grade and the figures behind it.
 struct Verdict {

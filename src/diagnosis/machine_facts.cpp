@@ -2,10 +2,10 @@
 #include "diagnosis/machine_facts.hpp"
 
 #include <cstdlib>
-#include <fstream>
 #include <set>
 
 #include "driver/sysfs.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::diagnosis {
 
@@ -39,16 +39,6 @@ std::string preemption_model(const fs::path& root) {
   return version.find("PREEMPT") != std::string::npos ? "full" : version.empty() ? unknown : "none or voluntary";
 }
 
-/// The value of `key` in /proc/cpuinfo.
-std::string cpuinfo(const fs::path& root, std::string_view key) {
-  std::ifstream stream(root / "proc/cpuinfo");
-  for (std::string line; std::getline(stream, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with(key) && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return {};
-}
-
 std::string governors(const fs::path& root) {
   std::set<std::string> found;
   std::error_code ignored;
@@ -57,9 +47,7 @@ std::string governors(const fs::path& root) {
       found.insert(name);
     }
   }
-  std::string text;
-  for (const std::string& name : found) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return found.empty() ? "none" : rig::joined({found.begin(), found.end()});
 }
 
 Finding kernel_finding(const MachineFacts& facts) {
@@ -121,8 +109,8 @@ MachineFacts read_machine_facts(const fs::path& root) {
           .governor = governors(root),
           .isolated_cpus = first_line(cpus / "isolated", "none"),
           .online_cpus = first_line(cpus / "online", unknown),
-          .cpu_model = cpuinfo(root, "model name"),
-          .virtual_machine = cpuinfo(root, "flags").find(" hypervisor") != std::string::npos,
+          .cpu_model = driver::value_in(root / "proc/cpuinfo", "model name"),
+          .virtual_machine = driver::value_in(root / "proc/cpuinfo", "flags").find(" hypervisor") != std::string::npos,
           .load_1min = std::strtod(first_line(root / "proc/loadavg").c_str(), nullptr)};
 }
 

@@ -2,11 +2,13 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 namespace abs_hil::driver {
 
@@ -16,6 +18,18 @@ namespace abs_hil::driver {
   std::string line;
   std::getline(in, line);
   return line;
+}
+
+/// What stands behind the colon in the first line that begins with `key`, as in /proc/cpuinfo and /proc/self/status;
+/// empty if there is no such line.
+[[nodiscard]] inline std::string value_in(const std::filesystem::path& file, std::string_view key) {
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t colon = line.find(':');
+    if (!line.starts_with(key) || colon == line.npos) continue;
+    return line.substr(std::min(line.find_first_not_of(" \t", colon + 1), line.size()));
+  }
+  return {};
 }
 
 /// Name of a process; empty if unknown.

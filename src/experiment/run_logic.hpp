@@ -17,7 +17,7 @@
 #include "rig/reason_text.hpp"
 #include "rig/run_names.hpp"
 #include "runtime/command_gate.hpp"
-#include "runtime/cycle_logic.hpp"
+#include "runtime/cyclic_executive.hpp"
 
 namespace abs_hil::experiment {
 

@@ -1,7 +1,18 @@
-// What ResultFile does alike on every platform: it gathers what is written, and hands it on in large pieces.
+// What ResultFile and FileError do alike on every platform: texts of errors, and writing in large pieces.
+#include <system_error>
+
 #include "files/result_file.hpp"
 
 namespace abs_hil::files {
+
+FileError::FileError(std::string_view kind, const std::filesystem::path& path, int error_number)
+    : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
+                error_number) {}
+
+FileError::FileError(std::string_view kind, const std::filesystem::path& path, std::string_view why, int error_number)
+    : std::runtime_error(
+          std::string("cannot write ").append(kind).append(" '").append(path.string()).append("': ").append(why)),
+      error_number_(error_number) {}
 
 void ResultFile::append(std::string_view bytes) {
   if (buffer_.size() + bytes.size() > buffer_bytes) flush();

@@ -23,29 +23,6 @@ constexpr int links_max = 40;  // as the kernel
 
 std::string folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path().string() : "."; }
 
-std::string fix_for(const fs::path& path, int error_number) {
-  switch (error_number) {
-    case ENOENT: return "create the directory first: mkdir -p '" + folder_of(path) + "'";
-    case ENOTDIR: return "a part of the path is a file, not a directory: choose another path";
-    case EISDIR: return "this is a directory: add a file name";
-    case EACCES:
-    case EPERM: return "choose a place that you may write to, or get the right to write to '" + folder_of(path) + "'";
-    case EROFS: return "the file system is read-only: choose another place";
-    case ENOSPC:
-    case EDQUOT: return "free some space on that file system, or choose another";
-    case EFBIG: return "the file reached the size limit: raise it (ulimit -f), or log less";
-    case EMFILE:
-    case ENFILE: return "too many open files: raise the limit (ulimit -n)";
-    case ENAMETOOLONG: return "choose a shorter name: 255 bytes at most, 4095 with all its directories";
-    case ELOOP: return "its symbolic links lead in a circle: remove them";
-    default: return "choose another path";
-  }
-}
-
-std::string text_for(std::string_view kind, const fs::path& path, std::string_view why) {
-  return std::string("cannot write ").append(kind).append(" '").append(path.string()).append("': ").append(why);
-}
-
 /// No other process on any computer writes under this name. It is short, however long the result's name is.
 std::string part_name(const fs::path& target) {
   static std::atomic<unsigned> number{0};
@@ -102,19 +79,31 @@ std::shared_ptr<void> claim(const std::string& kind, const fs::path& path, const
 
 }  // namespace
 
+std::string FileError::fix_for(const fs::path& path, int error_number) {
+  switch (error_number) {
+    case ENOENT: return "create the directory first: mkdir -p '" + folder_of(path) + "'";
+    case ENOTDIR: return "a part of the path is a file, not a directory: choose another path";
+    case EISDIR: return "this is a directory: add a file name";
+    case EACCES:
+    case EPERM: return "choose a place that you may write to, or get the right to write to '" + folder_of(path) + "'";
+    case EROFS: return "the file system is read-only: choose another place";
+    case ENOSPC:
+    case EDQUOT: return "free some space on that file system, or choose another";
+    case EFBIG: return "the file reached the size limit: raise it (ulimit -f), or log less";
+    case EMFILE:
+    case ENFILE: return "too many open files: raise the limit (ulimit -n)";
+    case ENAMETOOLONG: return "choose a shorter name: 255 bytes at most, 4095 with all its directories";
+    case ELOOP: return "its symbolic links lead in a circle: remove them";
+    default: return "choose another path";
+  }
+}
+
 void note_input(const fs::path& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error) && !fs::is_directory(path, error)) return;
   const std::scoped_lock lock(known_files().mutex);
   known_files().inputs.insert(place_of(path));
 }
-
-FileError::FileError(std::string_view kind, const fs::path& path, int error_number)
-    : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
-                error_number) {}
-
-FileError::FileError(std::string_view kind, const fs::path& path, std::string_view why, int error_number)
-    : std::runtime_error(text_for(kind, path, why)), error_number_(error_number) {}
 
 ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_folder)
     : path_(std::move(path)), kind_(std::move(kind)) {
@@ -131,7 +120,8 @@ ResultFile::~ResultFile() {
 
 void ResultFile::fail(int error_number) const {
   const fs::path& place = target_.empty() ? path_ : target_;  // behind a link
-  throw FileError(kind_, path_, std::generic_category().message(error_number) + "; " + fix_for(place, error_number),
+  throw FileError(kind_, path_,
+                  std::generic_category().message(error_number) + "; " + FileError::fix_for(place, error_number),
                   error_number);
 }
 

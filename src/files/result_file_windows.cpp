@@ -15,11 +15,7 @@ namespace abs_hil::files {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-constexpr std::size_t write_bytes = 1U << 20U;  // at once: the call takes a number of 32 bits
-
-std::string fix_for(const fs::path& path, int error_number) {
+std::string FileError::fix_for(const fs::path& path, int error_number) {
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
   switch (error_number) {
     case ENOENT: return "create the directory first: mkdir \"" + folder + '"';
@@ -29,19 +25,6 @@ std::string fix_for(const fs::path& path, int error_number) {
     default: return "choose another path";
   }
 }
-
-std::string text_for(std::string_view kind, const fs::path& path, std::string_view why) {
-  return std::string("cannot write ").append(kind).append(" '").append(path.string()).append("': ").append(why);
-}
-
-}  // namespace
-
-FileError::FileError(std::string_view kind, const fs::path& path, int error_number)
-    : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
-                error_number) {}
-
-FileError::FileError(std::string_view kind, const fs::path& path, std::string_view why, int error_number)
-    : std::runtime_error(text_for(kind, path, why)), error_number_(error_number) {}
 
 ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_folder)
     : path_(std::move(path)), kind_(std::move(kind)) {
@@ -84,6 +67,7 @@ void ResultFile::open_part(const fs::path& folder) {
 }
 
 void ResultFile::put(std::string_view bytes) {
+  constexpr std::size_t write_bytes = 1U << 20U;  // at once: the call takes a number of 32 bits
   while (!bytes.empty()) {
     const int written =
         ::_write(file_, bytes.data(), static_cast<unsigned>(bytes.size() < write_bytes ? bytes.size() : write_bytes));

@@ -1,9 +1,9 @@
-// Starts, arms and ends the guardian that a run has of its own.
+// Starts, arms and ends the guardian that a run has of its own, with the launch configuration that it passes on.
 #include "guardian/guard.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,17 +13,21 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"
+#include "rig/parse_json.hpp"
+#include "telemetry/flight_record.hpp"
 
 namespace abs_hil::guardian {
 
 namespace {
 
-constexpr const char* ready_format = "ready %d %d:%n";
 constexpr int ready_within_ms = 5000;
 constexpr int ends_within_ms = 500;
 
@@ -114,8 +118,48 @@ void Guard::refuse_weaker(const runtime::Scheduling& guardian, const runtime::Sc
              program + "), or set a lower realtime.priority");
 }
 
-std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes) {
-  return rig::formatted("ready %d %d:", guardian.fifo_priority, guardian.memory_locked ? 1 : 0) + notes;
+std::string to_json(const LaunchConfig& config) {
+  const telemetry::ExperimentInfo& run = config.run;
+  return nlohmann::json{{"config_json", run.config_json},
+                        {"experiment", run.experiment},
+                        {"controller", run.controller},
+                        {"plant", run.plant},
+                        {"backend", run.backend},
+                        {"version", run.version},
+                        {"realtime", static_cast<int>(config.realtime)},
+                        {"record_prefix", config.record_prefix},
+                        {"signals", run.names.signals}}
+      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+LaunchConfig parse_launch_config(const std::string& json) try {
+  const nlohmann::json object = rig::parse_json(json);
+  return {.run = {.experiment = object.at("experiment"),
+                  .controller = object.at("controller"),
+                  .plant = object.at("plant"),
+                  .backend = object.at("backend"),
+                  .config_json = object.at("config_json"),
+                  .version = object.at("version"),
+                  .names = {.signals = object.at("signals")}},
+          .realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
+          .record_prefix = object.at("record_prefix")};
+} catch (const nlohmann::json::exception& error) {
+  throw std::runtime_error(std::string("guardian: not a launch configuration: ") + error.what());
+}
+
+void write_flight_files(const LaunchConfig& launch, const std::string& channel_prefix,
+                        const runtime::FlightRing& recorder, const GuardianReport& report, std::string account) {
+  if (launch.record_prefix.empty()) return;
+  const auto records = recorder.contents();
+  std::vector<std::string> problems;
+  const auto files = telemetry::write_flight_record(launch.record_prefix,
+                                                    {.records = records,
+                                                     .reason = report.reason,
+                                                     .reason_value = static_cast<double>(report.silence_ns) * 1e-9,
+                                                     .account = std::move(account)},
+                                                    launch.run, channel_prefix, problems);
+  for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
+  for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
 }
 
 std::string guardian_program() {
@@ -129,8 +173,8 @@ std::string guardian_program() {
 }
 
 GuardianProcess::GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json)
-    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
-  static_cast<void>(pages_.leave_guard_page());
+    : Guard(Pages()), recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
+  static_cast<void>(pages().leave_guard_page());
 }
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
@@ -147,14 +191,16 @@ void GuardianProcess::arm(const runtime::Scheduling& controller) {
 }
 
 void GuardianProcess::start() {
-  std::array<int, 2> pipe{-1, -1};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse_for("cannot open a pipe", errno);
-  ready_ = driver::FileDescriptor(pipe[0]);
-  const auto ready = high_copy(driver::FileDescriptor(pipe[1]));
+  std::array<int, 2> ends{-1, -1};
+  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    refuse_for("cannot open a pair of sockets", errno);
+  }
+  ready_ = driver::FileDescriptor(ends[0]);
+  const auto ready = high_copy(driver::FileDescriptor(ends[1]));
   reset_page();
   const auto recorder = high_copy(recorder_.descriptor());
-  const auto run_page = high_copy(pages_.descriptors().run);
-  const auto guard_page = high_copy(pages_.descriptors().guard);
+  const auto run_page = high_copy(pages().descriptors().run);
+  const auto guard_page = high_copy(pages().descriptors().guard);
   const auto controller = high_copy(driver::FileDescriptor(open_pidfd(::getpid())));
   const auto launch_config = high_copy(driver::FileDescriptor(text_in_memory(launch_config_)));
 
@@ -187,31 +233,16 @@ void GuardianProcess::start() {
 }
 
 runtime::Scheduling GuardianProcess::wait_until_ready() {
-  std::string said;
-  for (;;) {
-    pollfd readable{ready_.get(), POLLIN, 0};
-    const int ready = ::poll(&readable, 1, ready_within_ms);
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
-    std::array<char, 512> part{};
-    const ssize_t got = ::read(ready_.get(), part.data(), part.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) break;
-    said.append(part.data(), static_cast<std::size_t>(got));
+  if (!is_readable(ready_.get(), ready_within_ms)) {
+    refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
   }
-  constexpr std::string_view ready_word = "ready ";
-  constexpr std::string_view error_word = "error ";
-  if (said.starts_with(error_word)) refuse_run(said.substr(error_word.size()));
-  if (!said.starts_with(ready_word)) refuse_run(program_ + " ended before it was ready");
-  runtime::Scheduling has;
-  int locked = 0;
-  int notes_at = 0;
-  if (std::sscanf(said.c_str(), ready_format, &has.fifo_priority, &locked, &notes_at) < 2 || notes_at == 0) {
-    refuse_run(program_ + " comes from another build of abs_hil");
-  }
-  has.memory_locked = locked != 0;
-  notes_ = said.substr(static_cast<std::size_t>(notes_at));
-  return has;
+  char first = 0;
+  if (::recv(ready_.get(), &first, 1, MSG_PEEK) <= 0) refuse_run(program_ + " ended before it was ready");
+  const auto said = receive_message(ready_.get(), 0);
+  if (said && said->word == LeaseWord::refused) refuse_run(said->text);
+  if (!said || said->word != LeaseWord::ready) refuse_run(program_ + " comes from another build of abs_hil");
+  notes_ = said->text;
+  return said->scheduling;
 }
 
 bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !has_ended(process_.get()); }

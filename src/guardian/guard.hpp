@@ -4,9 +4,13 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 
+#include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
+#include "runtime/realtime_setup.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::guardian {
 
@@ -30,7 +34,7 @@ class Guard : public runtime::RunGuard {
   /// @param stage  `closed`: the driver is gone; `resting`: it stays active and sends zeros
   virtual GuardEnd end(Stage stage = Stage::closed) noexcept = 0;
   /// The pages that the run shares with its guard.
-  [[nodiscard]] virtual Pages& pages() noexcept = 0;
+  [[nodiscard]] const Pages& pages() const noexcept { return pages_; }
   /// What the guardian could not obtain (real time), as text; empty if it lacks nothing.
   [[nodiscard]] const std::string& notes() const noexcept { return notes_; }
 
@@ -38,6 +42,7 @@ class Guard : public runtime::RunGuard {
   void outputs_released(bool safe) noexcept final;
 
  protected:
+  explicit Guard(Pages pages) noexcept : pages_(std::move(pages)) {}
   /// Throws driver::Unavailable if the guardian would be scheduled after the controller, or swapped out before it.
   static void refuse_weaker(const runtime::Scheduling& guardian, const runtime::Scheduling& controller,
                             const std::string& program);
@@ -47,24 +52,39 @@ class Guard : public runtime::RunGuard {
   bool close_page(Stage stage) noexcept;
 
   std::string notes_{};
+
+ private:
+  Pages pages_;
 };
 
 /// "guardian: WHAT. The run does not start ..." as driver::Unavailable.
 [[noreturn]] void refuse_run(const std::string& what);
 
+/// What the controller passes to the guardian when it starts it.
+struct LaunchConfig {
+  telemetry::ExperimentInfo run{};  ///< for the flight recorder's files; without names of phases
+  runtime::RealtimeMode realtime{runtime::RealtimeMode::prefer};
+  std::string record_prefix{};  ///< path prefix of the files that the guardian writes; empty: it writes none
+};
+
+[[nodiscard]] std::string to_json(const LaunchConfig& config);
+/// Throws std::runtime_error if `json` is not a launch configuration.
+[[nodiscard]] LaunchConfig parse_launch_config(const std::string& json);
+
+/// Writes the flight record of a run to the files that its launch config names, if it names any. Tells on stderr.
+void write_flight_files(const LaunchConfig& launch, const std::string& channel_prefix,
+                        const runtime::FlightRing& recorder, const GuardianReport& report, std::string account);
+
 /// The file descriptors that the guardian inherits. Besides these it has only stdin, stdout (both /dev/null) and
 /// stderr.
 enum InheritedDescriptor : int {
-  inherited_recorder = 3,    ///< SharedRecorder
-  inherited_controller = 4,  ///< pidfd of the controller
-  inherited_ready = 5,  ///< pipe to the controller: the guardian writes once what `ready_text` makes, or "error WHAT"
+  inherited_recorder = 3,       ///< SharedRecorder
+  inherited_controller = 4,     ///< pidfd of the controller
+  inherited_ready = 5,          ///< socket to the controller: the guardian sends one LeaseMessage, `ready` or `refused`
   inherited_launch_config = 6,  ///< LaunchConfig as JSON, read from offset 0
   inherited_run_page = 7,       ///< both of Pages
   inherited_guard_page = 8,
 };
-
-/// What a guardian that stands by tells its controller.
-[[nodiscard]] std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes);
 
 /// Path of the guardian's program: abs_guardian in the folder of the running program, otherwise the installed one.
 [[nodiscard]] std::string guardian_program();
@@ -85,7 +105,6 @@ class GuardianProcess final : public Guard {
   [[nodiscard]] bool armed() const noexcept override { return pid_ != 0; }
   [[nodiscard]] pid_t pid() const noexcept override { return pid_; }
   GuardEnd end(Stage stage = Stage::closed) noexcept override;
-  [[nodiscard]] Pages& pages() noexcept override { return pages_; }
 
  private:
   void start();
@@ -93,7 +112,6 @@ class GuardianProcess final : public Guard {
   [[nodiscard]] runtime::Scheduling wait_until_ready();
 
   const SharedRecorder& recorder_;
-  Pages pages_{};
   std::string program_;
   std::string launch_config_;
   pid_t pid_{0};

@@ -15,9 +15,9 @@
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
 #include "guardian/guard.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
-#include "guardian/guarding.hpp"
-#include "guardian/launch_config.hpp"
+#include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
 #include "runtime/board_policy.hpp"
 
@@ -29,8 +29,8 @@ namespace {
 std::atomic<bool> released_by_person{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-void tell_controller(const std::string& text) {
-  [[maybe_unused]] const auto written = ::write(inherited_ready, text.data(), text.size());
+void tell_controller(const LeaseMessage& message) {
+  static_cast<void>(send_message(inherited_ready, message));
   ::close(inherited_ready);
 }
 
@@ -80,7 +80,9 @@ int guard() {
                     .released = &released_by_person});
   guard.cover_only(std::move(pages), inherited_controller);
   const bool lacks = setup.launch.realtime == runtime::RealtimeMode::prefer && !realtime.realtime();
-  tell_controller(ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
+  tell_controller({.word = LeaseWord::ready,
+                   .scheduling = realtime.scheduling,
+                   .text = lacks ? realtime.shortcomings() : std::string()});
 
   run_guard(guard, clock, [] {});
   const GuardianReport& report = guard.report();
@@ -122,7 +124,7 @@ int guard_one_run() {
   try {
     return guard();
   } catch (const std::exception& error) {
-    tell_controller(std::string("error ") + error.what());
+    tell_controller({.word = LeaseWord::refused, .text = error.what()});
     return exit_not_started;
   }
 }

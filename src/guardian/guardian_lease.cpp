@@ -1,18 +1,25 @@
-// The run's side of a lease: it asks the resident service for the outputs, arms it and ends it.
+// Decides who guards a run; asks the resident service for a lease of the outputs, arms it and ends it.
 #include "guardian/guardian_lease.hpp"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
 #include <utility>
+#include <variant>
 
+#include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
+#include "runtime/board_policy.hpp"
 
 namespace abs_hil::guardian {
 
@@ -28,8 +35,9 @@ constexpr std::int64_t state_within_ns = 2000 * rig::ns_per_ms;
 constexpr std::int64_t safe_within_ns = 300 * rig::ns_per_ms;
 
 std::string why_not(int error) {
-  if (error == EAGAIN) return "its queue of visitors is full";
-  return std::string(std::strerror(error)) + (error == EACCES ? ": join the group abs_hil and log in again" : "");
+  if (error == EAGAIN) return "its queue of visitors is full; end it and start it again";
+  return std::string(std::strerror(error)) +
+         (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket");
 }
 
 std::optional<ServiceAnswer> call(const std::string& path, const LeaseMessage& message, std::int64_t within_ns) {
@@ -52,35 +60,50 @@ std::optional<ServiceAnswer> call(const std::string& path, const LeaseMessage& m
   return said;
 }
 
+/// The same folder has one name, whatever links lead to it.
+std::string plain(const std::string& text) {
+  if (!text.starts_with('/')) return text.empty() ? "the only one" : text;
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::weakly_canonical(text, error);
+  return error ? text : path.string();
+}
+
+/// The end of a namespace's first process ends all others in it, the guardian too, before anybody can write.
+void refuse_own_guardian_of_first_process(const driver::DriverOptions& driver) {
+  if (::getpid() != 1 || (driver.emulated && !runtime::is_real_board(driver))) return;
+  throw driver::Unavailable(
+      "guardian: this program is process 1 of its namespace (a container's entry point): its end would end its own "
+      "guardian too, and the board would hold its duties. Use the resident service of the computer: give the container "
+      "/run/abs_hil and set guardian.resident=require (docs/dead-man.md)");
+}
+
 }  // namespace
 
 std::unique_ptr<GuardianLease> GuardianLease::ask(const std::string& path, const std::string& board) {
   driver::FileDescriptor socket(connect_to(path));
   if (socket.get() < 0) {
     if (errno == ENOENT || errno == ECONNREFUSED) return nullptr;
-    const int error = errno;
-    const std::string what = "cannot reach the resident service at " + path + ": ";
-    if (error == EAGAIN) refuse_run(what + "it accepts no connection; end it and start it again");
-    refuse_run(what + std::strerror(error) +
-               (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket"));
+    const std::string why = why_not(errno);
+    refuse_run("cannot reach the resident service at " + path + ": " + why);
   }
   const driver::FileDescriptor self(open_pidfd(::getpid()));
   if (self.get() < 0) refuse_run(std::string("cannot open a pidfd of this process: ") + std::strerror(errno));
-  std::unique_ptr<GuardianLease> lease(new GuardianLease(std::move(socket)));
+  const Peer peer = peer_of(socket.get());
+  driver::FileDescriptor process(open_pidfd(peer.pid));
   // A service that refuses at once has closed its end already. Its answer is still to be read.
-  static_cast<void>(send_message(lease->socket_.get(), {.word = LeaseWord::ask, .text = board}, {self.get()}));
-  const auto answer = receive_message(lease->socket_.get(), answers_within_ms);
-  const std::string service =
-      "the resident service (process " + std::to_string(lease->service_.pid) + ", " + path + ") ";
+  static_cast<void>(send_message(socket.get(), {.word = LeaseWord::ask, .text = board}, {self.get()}));
+  const auto answer = receive_message(socket.get(), answers_within_ms);
+  const std::string service = "the resident service (process " + std::to_string(peer.pid) + ", " + path + ") ";
   if (!answer) refuse_run(service + "gave no answer");
   if (answer->word != LeaseWord::granted) refuse_run(service + "refused a lease: " + answer->text);
   if (answer->files.size() != 2) refuse_run(service + "comes from another build of abs_hil");
-  lease->pages_.emplace(Pages::as_run({answer->files[0].get(), answer->files[1].get()}));
-  return lease;
+  Pages pages = Pages::as_run({answer->files[0].get(), answer->files[1].get()});
+  return std::unique_ptr<GuardianLease>(
+      new GuardianLease(std::move(socket), peer.pid, std::move(process), std::move(pages)));
 }
 
-GuardianLease::GuardianLease(driver::FileDescriptor socket)
-    : socket_(std::move(socket)), service_(peer_of(socket_.get())), guard_process_(open_pidfd(service_.pid)) {}
+GuardianLease::GuardianLease(driver::FileDescriptor socket, pid_t service, driver::FileDescriptor process, Pages pages)
+    : Guard(std::move(pages)), socket_(std::move(socket)), service_(service), guard_process_(std::move(process)) {}
 
 GuardianLease::~GuardianLease() { static_cast<void>(end()); }
 
@@ -92,7 +115,7 @@ void GuardianLease::cover(const SharedRecorder& recorder, std::string launch_con
 void GuardianLease::arm(const runtime::Scheduling& controller) {
   const driver::FileDescriptor launch_config(text_in_memory(launch_config_));
   if (recorder_ == nullptr || launch_config.get() < 0) refuse_run("cannot hand the run over to the resident service");
-  ends_before_ = pages_->guard().ends.load(std::memory_order_acquire);
+  ends_before_ = pages().guard().ends.load(std::memory_order_acquire);
   reset_page();
   if (!send_message(socket_.get(), {.word = LeaseWord::cover}, {recorder_->descriptor(), launch_config.get()})) {
     refuse_run(std::string("the resident service ended the lease: ") + std::strerror(errno));
@@ -114,7 +137,7 @@ bool GuardianLease::alive() const noexcept {
 GuardEnd GuardianLease::end(Stage stage) noexcept {
   if (!std::exchange(armed_, false)) return GuardEnd::none;
   const bool handed_over = close_page(stage);
-  const GuardPage& guard = pages_->guard();
+  const GuardPage& guard = pages().guard();
   for (int waited_ms = 0; waited_ms < dismissed_within_ms && alive(); waited_ms += looks_every_ms) {
     if (guard.ends.load(std::memory_order_acquire) != ends_before_) {
       return guard.ended_safe.load(std::memory_order_relaxed) ? GuardEnd::ended : GuardEnd::insisting;
@@ -130,6 +153,56 @@ std::optional<ServiceAnswer> service_state(const std::string& socket) {
 
 std::optional<ServiceAnswer> service_makes_safe(const std::string& socket, const std::string& boards) {
   return call(socket, {.word = LeaseWord::make_safe, .text = boards}, safe_within_ns);
+}
+
+std::string kept_board(const driver::DriverOptions& options) {
+  if (!driver::is_known(options.kind)) return options.kind;
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
+  // The texts among the free options say where the board is.
+  std::string text = options.kind;
+  driver::BoardOptions copy = chosen.options;
+  copy.visit_options("", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    const auto& free = chosen.entry.free_options;
+    if (std::ranges::find(free, std::string_view(name)) == free.end()) return;
+    if (const auto* const* place = std::get_if<std::string*>(&value)) text += ", " + name + " " + plain(**place);
+  });
+  return text;
+}
+
+bool needs_guardian(const config::Settings& settings, bool virtual_time) {
+  return settings.backend == "rig" && !virtual_time && settings.guardian.enabled;
+}
+
+std::unique_ptr<GuardianLease> ask_for_lease(const config::Settings& settings, bool virtual_time) {
+  if (!needs_guardian(settings, virtual_time)) return nullptr;
+  const runtime::GuardianOptions& options = settings.guardian;
+  const driver::DriverOptions& driver = settings.driver;
+  const bool wanted = options.resident == "require" || (options.resident == "auto" && runtime::is_real_board(driver));
+  if (wanted) {
+    auto lease = GuardianLease::ask(options.socket, kept_board(driver));
+    if (lease) return lease;
+    if (options.resident == "require") {
+      throw driver::Unavailable(
+          fmt::format("guardian: no resident service listens at {} (guardian.socket), and guardian.resident = require; "
+                      "start it: sudo systemctl start abs-guardian, or abs_guardian serve (docs/dead-man.md)",
+                      options.socket));
+    }
+  }
+  refuse_own_guardian_of_first_process(driver);
+  return nullptr;
+}
+
+std::string who_guards(const Guard& guard, bool resident, const config::Settings& settings) {
+  if (resident) {
+    return fmt::format("the resident service guards this run (process {}, {})", guard.pid(), settings.guardian.socket);
+  }
+  std::string text = fmt::format("process {}, which this run started, stands by", guard.pid());
+  if (runtime::is_real_board(settings.driver)) {
+    text +=
+        "; what ends or stops both at once (a container, a systemd scope, a suspension) leaves the outputs as they "
+        "are: the resident service covers that (sudo systemctl enable --now abs-guardian, docs/dead-man.md)";
+  }
+  return text;
 }
 
 }  // namespace abs_hil::guardian

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "config/settings.hpp"
+#include "driver/factory.hpp"
 #include "driver/file_descriptor.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/lease_wire.hpp"
@@ -28,17 +30,15 @@ class GuardianLease final : public Guard {
   void arm(const runtime::Scheduling& controller) override;
   [[nodiscard]] bool alive() const noexcept override;
   [[nodiscard]] bool armed() const noexcept override { return armed_; }
-  [[nodiscard]] pid_t pid() const noexcept override { return service_.pid; }
+  [[nodiscard]] pid_t pid() const noexcept override { return service_; }
   GuardEnd end(Stage stage = Stage::closed) noexcept override;
-  [[nodiscard]] Pages& pages() noexcept override { return *pages_; }
 
  private:
-  explicit GuardianLease(driver::FileDescriptor socket);
+  GuardianLease(driver::FileDescriptor socket, pid_t service, driver::FileDescriptor process, Pages pages);
 
   driver::FileDescriptor socket_;
-  Peer service_;
+  pid_t service_;
   driver::FileDescriptor guard_process_{-1};  ///< -1: not visible from here, as in a container
-  std::optional<Pages> pages_{};
   const SharedRecorder* recorder_{nullptr};
   std::string launch_config_{};
   std::uint32_t ends_before_{0};  ///< of the guard's page
@@ -60,5 +60,21 @@ struct ServiceAnswer {
 /// service that is stopped, or whose queue is full of silent visitors, gives none.
 /// @param boards  names of the board (kept_board), one a line; a service of another board does nothing
 [[nodiscard]] std::optional<ServiceAnswer> service_makes_safe(const std::string& socket, const std::string& boards);
+
+/// Kind and place of the board that the options name, as text. Two processes that mean the same board have the same
+/// text.
+[[nodiscard]] std::string kept_board(const driver::DriverOptions& options);
+
+/// Whether a run needs a guardian: only in real time on a board. In simulation and in virtual time nothing real moves.
+[[nodiscard]] bool needs_guardian(const config::Settings& settings, bool virtual_time);
+
+/// Asks the resident service for the outputs, if `guardian.resident` and the board call for it. Call it before the
+/// driver opens the board: the service has the board until then. Null: the run starts a guardian of its own, or needs
+/// none. Throws driver::Unavailable if the service refuses, if there is none and there must be one, and for a guardian
+/// of the run's own that would end together with the run.
+[[nodiscard]] std::unique_ptr<GuardianLease> ask_for_lease(const config::Settings& settings, bool virtual_time);
+
+/// Which guardian stands by, and what it does not cover, in words.
+[[nodiscard]] std::string who_guards(const Guard& guard, bool resident, const config::Settings& settings);
 
 }  // namespace abs_hil::guardian

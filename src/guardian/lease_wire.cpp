@@ -2,7 +2,6 @@
 #include "guardian/lease_wire.hpp"
 
 #include <poll.h>
-#include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -62,13 +61,7 @@ bool send_message(int socket, const LeaseMessage& message, std::initializer_list
 }
 
 std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
-  pollfd readable{socket, POLLIN, 0};
-  int ready = 0;
-  do {
-    ready = ::poll(&readable, 1, timeout_ms);
-  } while (ready < 0 && errno == EINTR);
-  if (ready <= 0) return std::nullopt;
-
+  if (!is_readable(socket, timeout_ms)) return std::nullopt;
   LeaseHeader header{};
   std::string text(longest_text, '\0');
   std::array<iovec, 2> parts{iovec{&header, sizeof header}, iovec{text.data(), text.size()}};
@@ -84,10 +77,9 @@ std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
 }
 
 Peer peer_of(int socket) noexcept {
-  ucred credentials{};
-  socklen_t size = sizeof credentials;
-  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {};
-  return {.pid = credentials.pid, .uid = credentials.uid, .gid = credentials.gid};
+  Peer peer{};
+  socklen_t size = sizeof peer;
+  return ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 ? peer : Peer{};
 }
 
 int listen_at(const std::string& path) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <sys/types.h>
+#include <sys/socket.h>
 
 #include <cstdint>
 #include <initializer_list>
@@ -10,7 +10,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 
@@ -48,12 +48,8 @@ struct LeaseMessage {
 /// that is no message of this build.
 [[nodiscard]] std::optional<LeaseMessage> receive_message(int socket, int timeout_ms);
 
-/// The process at the other end.
-struct Peer {
-  pid_t pid{0};
-  uid_t uid{0};
-  gid_t gid{0};
-};
+/// The process at the other end; its pid is 0 if that is unknown.
+using Peer = ::ucred;
 [[nodiscard]] Peer peer_of(int socket) noexcept;
 
 /// A socket bound to `path`, or connected to it. Returns a descriptor, or -1 and errno. A service that stands still

@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/sysfs.hpp"
@@ -41,11 +41,11 @@ int LinuxProcesses::open(pid_t pid) noexcept {
   return -1;
 }
 
-bool has_ended(int pidfd, int timeout_ms) noexcept {
-  pollfd ended{pidfd, POLLIN, 0};
+bool is_readable(int fd, int timeout_ms) noexcept {
+  pollfd readable{fd, POLLIN, 0};
   int ready = 0;
   do {
-    ready = ::poll(&ended, 1, timeout_ms);  // POLLNVAL: there is no process
+    ready = ::poll(&readable, 1, timeout_ms);  // POLLNVAL: there is nothing
   } while (ready < 0 && errno == EINTR);
   return ready > 0;
 }
@@ -70,13 +70,8 @@ std::string name_of_process(pid_t pid) {
 }
 
 pid_t process_of(int pidfd) {
-  std::ifstream info("/proc/self/fdinfo/" + std::to_string(pidfd));
-  std::string field;
-  while (info >> field) {
-    pid_t pid = 0;
-    if (field == "Pid:" && info >> pid) return std::max(pid, 0);
-  }
-  return 0;
+  const std::string pid = driver::value_in("/proc/self/fdinfo/" + std::to_string(pidfd), "Pid:");
+  return std::max(static_cast<pid_t>(std::strtol(pid.c_str(), nullptr, 10)), 0);
 }
 
 bool send_packet(int socket, std::span<const iovec> parts, std::span<const int> files) noexcept {

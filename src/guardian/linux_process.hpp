@@ -20,8 +20,10 @@ namespace abs_hil::guardian {
 [[nodiscard]] pid_t process_of(int pidfd);
 /// Sends a signal through a pidfd; signal 0 only asks whether this process may. False and errno on failure.
 [[nodiscard]] bool send_signal(int pidfd, int signal) noexcept;
-/// True once the process behind the pidfd has ended, `timeout_ms` later at the latest.
-[[nodiscard]] bool has_ended(int pidfd, int timeout_ms = 0) noexcept;
+/// True once there is something to read, or never will be, `timeout_ms` later at the latest.
+[[nodiscard]] bool is_readable(int fd, int timeout_ms) noexcept;
+/// True once the process behind the pidfd has ended, `timeout_ms` later at the latest, and if there is no process.
+[[nodiscard]] inline bool has_ended(int pidfd, int timeout_ms = 0) noexcept { return is_readable(pidfd, timeout_ms); }
 /// "process 17 (abs_hil)"
 [[nodiscard]] std::string name_of_process(pid_t pid);
 

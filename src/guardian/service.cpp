@@ -27,13 +27,12 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "guardian/guard.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
-#include "guardian/guarding.hpp"
-#include "guardian/launch_config.hpp"
 #include "guardian/linux_process.hpp"
-#include "guardian/machine_pause.hpp"
+#include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
-#include "guardian/systemd.hpp"
 #include "guardian/talker.hpp"
 
 namespace abs_hil::guardian {
@@ -200,7 +199,7 @@ class Service {
     if (!realtime_->realtime()) say("NOT IN REAL TIME: it may act late\n" + realtime_->shortcomings());
     start_standby();
     start_talker();
-    ServiceManager::ready();
+    tell_systemd("READY=1");
     run_guard(guard, clock_, [&] { between_looks(guard); });
     page_->over.store(true, std::memory_order_relaxed);
     ::unlink(options.socket.c_str());
@@ -218,7 +217,7 @@ class Service {
     if (told_to_end.exchange(false, std::memory_order_relaxed)) guard.end();
     const std::int64_t now_ns = clock_.now_ns();
     if (now_ns >= next_alive_ns_) {
-      ServiceManager::alive();
+      tell_systemd("WATCHDOG=1");
       next_alive_ns_ = now_ns + alive_ns;
     }
     if (now_ns < next_companions_ns_) return;
@@ -247,9 +246,8 @@ class Service {
 
   void start_talker() {
     talker_beat_ns_ = clock_.now_ns();
-    talker_ =
-        start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), ServiceManager::descriptor()},
-                        [this](pid_t guard) { talk(guard); });
+    talker_ = start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
+                              [this](pid_t guard) { talk(guard); });
   }
   void start_standby() {
     standby_ = start_companion({}, [this](pid_t guard) { stand_by(guard); });
@@ -266,7 +264,6 @@ class Service {
     constexpr sched_param normal{};
     ::sched_setscheduler(0, SCHED_OTHER, &normal);
     SleepWatch sleep(say);
-    ServiceManager manager;
     TalkerParts parts{.clock = clock_,
                       .mail = mail_,
                       .page = *page_,
@@ -281,7 +278,10 @@ class Service {
                       .scheduling = realtime_->scheduling,
                       .shortcomings = realtime_->realtime() ? std::string() : realtime_->shortcomings(),
                       .tell = say,
-                      .status = [&manager](const std::string& text) { manager.status(text); }};
+                      .status =
+                          [told = std::string()](const std::string& text) mutable {
+                            if (std::exchange(told, text) != text) tell_systemd("STATUS=" + text);
+                          }};
     parts.interruptions.push_back(sleep.interruption());
     if (pause.works()) {
       say("compares the real-time clock, to find pauses of this virtual machine");

@@ -38,41 +38,38 @@ std::size_t sealed_bytes(int fd) noexcept {
 
 }  // namespace
 
-SharedMemory::SharedMemory(std::size_t bytes)
-    : fd_(::memfd_create("abs_hil run", MFD_CLOEXEC | MFD_ALLOW_SEALING)), bytes_(bytes) {
+SharedMemory::SharedMemory(std::size_t bytes) : fd_(::memfd_create("abs_hil run", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
   if (fd_.get() < 0) fail("cannot be made");
   if (::ftruncate(fd_.get(), static_cast<off_t>(bytes)) != 0 ||
       ::fcntl(fd_.get(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW) != 0) {
     fail("cannot be sized");
   }
-  map(fd_.get(), Access::write);
+  map(fd_.get(), bytes, Access::write);
 }
 
-SharedMemory::SharedMemory(int fd, std::size_t bytes, Access access) : bytes_(bytes) {
+SharedMemory::SharedMemory(int fd, std::size_t bytes, Access access) {
   if (sealed_bytes(fd) != bytes) {
     throw std::runtime_error(
         "guardian: the descriptor given is not the shared memory of a run of this build; install abs_hil and "
         "abs_guardian of one build");
   }
-  map(fd, access);
+  map(fd, bytes, access);
 }
 
-void SharedMemory::map(int fd, Access access) {
+void SharedMemory::map(int fd, std::size_t bytes, Access access) {
   const int protection = access == Access::write ? PROT_READ | PROT_WRITE : PROT_READ;
   // MAP_POPULATE: the cycle's first lap around the recorder must not cause page faults.
-  void* const memory = ::mmap(nullptr, bytes_, protection, MAP_SHARED | MAP_POPULATE, fd, 0);
+  void* const memory = ::mmap(nullptr, bytes, protection, MAP_SHARED | MAP_POPULATE, fd, 0);
   if (memory == MAP_FAILED) fail("cannot be mapped");
-  data_ = memory;
+  memory_ = {memory, Unmap{bytes}};
 }
 
 bool SharedMemory::refuse_further_writers() const noexcept {
   return ::fcntl(fd_.get(), F_ADD_SEALS, F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0;
 }
 
-bool SharedMemory::make_read_only() const noexcept { return ::mprotect(data_, bytes_, PROT_READ) == 0; }
-
-SharedMemory::~SharedMemory() {
-  if (data_ != nullptr) ::munmap(data_, bytes_);
+bool SharedMemory::make_read_only() const noexcept {
+  return ::mprotect(memory_.get(), memory_.get_deleter().bytes, PROT_READ) == 0;
 }
 
 Pages::Pages() : run_(sizeof(RunPage)), guard_(sizeof(GuardPage)) {

@@ -1,53 +1,48 @@
 #pragma once
 
+#include <sys/mman.h>
+
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 
 #include "driver/file_descriptor.hpp"
-#include "guardian/heartbeat.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
+
+using runtime::GuardPage;
+using runtime::RunPage;
+using runtime::Stage;
 
 /// Memory that two processes share through a descriptor. It is sealed: neither can shrink it under the other.
 class SharedMemory {
  public:
   enum class Access : std::uint8_t { read, write };
 
-  SharedMemory() = default;
   /// New memory of zeros. Throws std::system_error.
   explicit SharedMemory(std::size_t bytes);
   /// Maps what stands behind a descriptor, which the caller keeps. Throws std::runtime_error unless it is sealed memory
   /// of exactly `bytes` bytes: its sender cannot make this process map more.
   SharedMemory(int fd, std::size_t bytes, Access access);
-  SharedMemory(SharedMemory&& other) noexcept { swap(other); }
-  SharedMemory& operator=(SharedMemory&& other) noexcept {
-    SharedMemory moved(std::move(other));
-    swap(moved);
-    return *this;
-  }
-  SharedMemory(const SharedMemory&) = delete;
-  SharedMemory& operator=(const SharedMemory&) = delete;
-  ~SharedMemory();
 
   /// From now on nobody can map it for writing; mappings that exist stay writable. False if the kernel cannot do it.
   [[nodiscard]] bool refuse_further_writers() const noexcept;
   /// From now on this process can only read it here. False if the kernel cannot do it.
   [[nodiscard]] bool make_read_only() const noexcept;
   [[nodiscard]] int descriptor() const noexcept { return fd_.get(); }
-  [[nodiscard]] void* data() const noexcept { return data_; }
+  [[nodiscard]] void* data() const noexcept { return memory_.get(); }
 
  private:
-  void map(int fd, Access access);
-  void swap(SharedMemory& other) noexcept {
-    std::swap(fd_, other.fd_);
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
-  }
+  struct Unmap {
+    std::size_t bytes;
+    void operator()(void* memory) const noexcept { ::munmap(memory, bytes); }
+  };
+  void map(int fd, std::size_t bytes, Access access);
 
-  driver::FileDescriptor fd_{-1};  ///< of memory that this object made
-  void* data_{nullptr};
-  std::size_t bytes_{0};
+  driver::FileDescriptor fd_;  ///< of memory that this object made
+  std::unique_ptr<void, Unmap> memory_;
 };
 
 /// The pages of one run and its guard. Each side writes one of them.

@@ -23,6 +23,11 @@ constexpr std::int64_t speaks_within_ns = 2'000'000'000;
 constexpr std::size_t longest_shown = 500;  ///< of a client's own words
 constexpr short closed_events = POLLHUP | POLLRDHUP | POLLERR | POLLNVAL;
 
+/// One that does not take it is gone, or is dropped later.
+void send_to(const TalkerClient& client, const LeaseMessage& message) {
+  static_cast<void>(send_message(client.socket.get(), message));
+}
+
 bool names(const std::string& boards, const std::string& board) {
   std::istringstream lines(boards);
   for (std::string line; std::getline(lines, line);) {
@@ -151,12 +156,12 @@ void Talker::answer_state(const Client& client) {
         "process " + std::to_string(latest_.former_pid) + ", which had its lease, has not ended yet; " + outputs_text();
   }
   said.text = parts_.board + ": " + said.text;
-  static_cast<void>(send_message(client.socket.get(), said));
+  send_to(client, said);
 }
 
 void Talker::ask_for_safe(Client& client, const LeaseMessage& said) {
   if (!names(said.text, parts_.board)) {
-    static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = parts_.board}));
+    send_to(client, {.word = LeaseWord::refused, .text = parts_.board});
     return;
   }
   client.waits_for_safe = true;
@@ -167,13 +172,12 @@ void Talker::ask_for_safe(Client& client, const LeaseMessage& said) {
 void Talker::answer_safe_callers(const std::string& what) {
   for (Client& client : clients_) {
     if (!std::exchange(client.waits_for_safe, false)) continue;
-    static_cast<void>(send_message(
-        client.socket.get(), {.word = LeaseWord::answer, .safe = latest_.safe, .text = parts_.board + ": " + what}));
+    send_to(client, {.word = LeaseWord::answer, .safe = latest_.safe, .text = parts_.board + ": " + what});
   }
 }
 
 void Talker::refuse(Client& client, const std::string& why) {
-  static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = why}));
+  send_to(client, {.word = LeaseWord::refused, .text = why});
   client.asks = false;
   client.gone = true;
 }
@@ -185,7 +189,7 @@ std::string Talker::why_no_lease(const LeaseMessage& asked, const Peer& peer) co
            "; name that board's service with guardian.socket, or give both the same driver.* keys";
   }
   for (const Interruption& i : parts_.interruptions) {
-    if (const std::string why = i.bars_leases ? i.bars_leases() : std::string(); !why.empty()) return why;
+    if (const std::string why = i.bars_leases(); !why.empty()) return why;
   }
   return {};
 }
@@ -230,7 +234,7 @@ void Talker::cover(Client& client, const LeaseMessage& message) {
   } catch (const std::exception& error) {
     const std::string why = rig::clean_text(error.what(), longest_shown);  // it may quote what the client sent
     parts_.tell("does not guard " + held_->name + ": " + why);
-    static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = why}));
+    send_to(client, {.word = LeaseWord::refused, .text = why});
   }
 }
 
@@ -242,7 +246,9 @@ void Talker::hear_guard() {
 
 void Talker::take_news(const News& news, const std::vector<driver::FileDescriptor>& pages) {
   const driver::IoError before = std::exchange(latest_, news).board.error;
-  if (!std::exchange(knows_board_, true) || before != news.board.error) tell_state();
+  if (!std::exchange(knows_board_, true) || before != news.board.error) {
+    parts_.tell(parts_.board + ": " + outputs_text() + (news.board.ok() ? "" : "; tries on"));
+  }
   const bool of_held = held_ && held_->lease == news.lease;
   Client* const holder = of_held ? client_of(held_->socket) : nullptr;
   switch (news.word) {
@@ -251,15 +257,12 @@ void Talker::take_news(const News& news, const std::vector<driver::FileDescripto
       if (held_) break;
       answer_safe_callers("nobody has its lease; " + outputs_text());
       if (!std::exchange(interrupted_, false)) break;
-      for (const Interruption& i : parts_.interruptions) {
-        if (i.dealt_with) i.dealt_with(news.safe);
-      }
+      for (const Interruption& i : parts_.interruptions) i.dealt_with();
       break;
     case NewsWord::granted: give_lease(news, pages); break;
     case NewsWord::refused:
       if (holder != nullptr) {
-        static_cast<void>(send_message(holder->socket.get(), {.word = LeaseWord::refused,
-                                                              .text = "its lease has ended, or covers a run already"}));
+        send_to(*holder, {.word = LeaseWord::refused, .text = "its lease has ended, or covers a run already"});
       } else if (Client* const client = client_of(std::exchange(asking_, -1)); client != nullptr) {
         const std::string why = words_of(news.why, news);
         parts_.tell("refused a lease to " + name_of_process(client->peer.pid) + ": " + why);
@@ -268,9 +271,7 @@ void Talker::take_news(const News& news, const std::vector<driver::FileDescripto
       break;
     case NewsWord::covered:
       if (holder == nullptr) break;
-      static_cast<void>(
-          send_message(holder->socket.get(),
-                       {.word = LeaseWord::ready, .scheduling = parts_.scheduling, .text = parts_.shortcomings}));
+      send_to(*holder, {.word = LeaseWord::ready, .scheduling = parts_.scheduling, .text = parts_.shortcomings});
       break;
     case NewsWord::acted: {
       if (!of_held) break;
@@ -286,12 +287,6 @@ void Talker::take_news(const News& news, const std::vector<driver::FileDescripto
       break;
   }
   parts_.status(held_ ? "lease: " + held_->name : news.safe ? "no lease, outputs 0" : "no lease, OUTPUTS NOT VERIFIED");
-}
-
-void Talker::tell_state() {
-  parts_.tell(parts_.board + ": " +
-              (latest_.board.ok() ? "drive 0 and brake 0 written and read back"
-                                  : "NOT SAFE: " + driver::error_text(latest_.board) + "; tries on"));
 }
 
 void Talker::give_lease(const News& news, const std::vector<driver::FileDescriptor>& pages) {
@@ -310,9 +305,7 @@ void Talker::give_lease(const News& news, const std::vector<driver::FileDescript
     return close_holder();
   }
   held_->socket = client->socket.get();
-  for (const Interruption& i : parts_.interruptions) {
-    if (i.lease_changed) i.lease_changed(true);
-  }
+  for (const Interruption& i : parts_.interruptions) i.lease_changed(true);
   parts_.tell("lease granted to " + held_->name);
 }
 
@@ -320,9 +313,7 @@ void Talker::end_lease(const News& news) {
   const std::string name = held_->name;
   if (Client* const holder = client_of(held_->socket)) holder->gone = true;
   held_.reset();
-  for (const Interruption& i : parts_.interruptions) {
-    if (i.lease_changed) i.lease_changed(false);
-  }
+  for (const Interruption& i : parts_.interruptions) i.lease_changed(false);
   if (news.why != Refusal::none) parts_.tell("ended " + name + ": " + words_of(news.why, news));
   parts_.tell("lease ended: " + name);
   answer_safe_callers("ended the lease of " + name);

@@ -11,7 +11,7 @@
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
 #include "runtime/clock.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 
@@ -29,11 +29,11 @@ struct Interruption {
   /// Reads the descriptor. Returns why a lease must end; `none`: nothing but a new look at the board is needed.
   std::function<rig::Reason()> take;
   /// Called when a lease is granted and when it has ended.
-  std::function<void(bool held)> lease_changed{};
+  std::function<void(bool held)> lease_changed{[](bool) {}};
   /// Why nobody gets a lease at present; empty: no objection.
-  std::function<std::string()> bars_leases{};
+  std::function<std::string()> bars_leases{[] { return std::string(); }};
   /// Called once nobody has a lease and the board was made safe, or could not be.
-  std::function<void(bool safe)> dealt_with{};
+  std::function<void()> dealt_with{[] {}};
 };
 
 struct TalkerParts {
@@ -79,9 +79,6 @@ struct HeldLease {
 class Talker {
  public:
   explicit Talker(TalkerParts parts) : parts_(std::move(parts)) {}
-  Talker(const Talker&) = delete;
-  Talker& operator=(const Talker&) = delete;
-
   /// Waits for something to happen, at most `timeout_ms`, and deals with it.
   void step(int timeout_ms);
 
@@ -112,7 +109,6 @@ class Talker {
   void drop(Client& client);
   [[nodiscard]] Client* client_of(int socket);
   [[nodiscard]] std::string outputs_text() const;
-  void tell_state();
 
   TalkerParts parts_;
   std::vector<Client> clients_{};

@@ -3,9 +3,11 @@
 #include <cstdint>
 
 #include "abs_hil/rig/reason.hpp"
-#include "guardian/heartbeat.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
+
+using runtime::Stage;
 
 /// One look of the guardian at the controller.
 struct HeartbeatReading {

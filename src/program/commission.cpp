@@ -124,7 +124,7 @@ class GuardedPulse final : public experiment::PulseGuard {
   std::unique_ptr<guardian::GuardianLease>& lease_;
   // The guardian must be destroyed before the recorder that it uses.
   std::optional<guardian::SharedRecorder> recorder_{};
-  std::optional<guardian::Heartbeat> watch_{};
+  std::optional<runtime::Heartbeat> watch_{};
   std::optional<guardian::GuardianProcess> own_guardian_{};
   guardian::Guard* guardian_{nullptr};
 };

@@ -10,7 +10,7 @@
 #include "config/config_file.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"
 #include "runtime/board_policy.hpp"

@@ -5,7 +5,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/program/program.hpp"
-#include "cli/standard_output.hpp"
+#include "cli/command_line.hpp"
 #include "guardian/guardian_program.hpp"
 
 namespace abs_hil {

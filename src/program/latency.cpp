@@ -15,7 +15,7 @@
 #include "diagnosis/latency_verdict.hpp"
 #include "experiment/sequence.hpp"
 #include "files/result_file.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"

@@ -16,7 +16,6 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
-#include "cli/standard_output.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "interchange/foreign_controller.hpp"

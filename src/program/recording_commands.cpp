@@ -8,8 +8,7 @@
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
 #include "program/subcommands.hpp"
-#include "replay/recorded_run.hpp"
-#include "replay/rerun.hpp"
+#include "replay/replay.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
 

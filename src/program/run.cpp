@@ -17,7 +17,7 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "program/foreign_run.hpp"
 #include "program/questions.hpp"
 #include "program/run_monitor.hpp"

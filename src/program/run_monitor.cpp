@@ -10,7 +10,6 @@
 #include <ctime>
 
 #include "config/config_error.hpp"
-#include "guardian/launch_config.hpp"
 #include "telemetry/flight_record.hpp"
 
 namespace abs_hil::program {

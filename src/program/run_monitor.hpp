@@ -5,7 +5,7 @@
 #include <string>
 
 #include "guardian/guard.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
 #include "run/run.hpp"
@@ -52,7 +52,7 @@ class RunMonitor {
   std::optional<guardian::GuardianProcess> own_guardian_;
   guardian::Guard* guardian_{nullptr};
   std::optional<guardian::Pages> pages_;  ///< of a run without a guardian
-  std::optional<guardian::Heartbeat> heartbeat_;
+  std::optional<runtime::Heartbeat> heartbeat_;
   bool resident_;
   const RunRequest& request_;
   bool told_notes_{false};

@@ -11,7 +11,6 @@
 #include "files/result_file.hpp"
 #include "program/command_line.hpp"
 #include "run/run.hpp"
-#include "run_folder/environment.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/events.hpp"

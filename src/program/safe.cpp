@@ -17,7 +17,7 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "driver/monotonic_time.hpp"
-#include "guardian/guarding.hpp"
+#include "guardian/guardian_lease.hpp"
 #include "program/first_place.hpp"
 #include "program/subcommands.hpp"
 #include "program/zero_writing.hpp"

@@ -1,12 +1,11 @@
 // Reads a recorded run from its event log, with the settings that it had.
-#include "replay/recorded_run.hpp"
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
+#include "replay/replay.hpp"
 #include "rig/parse_json.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/message_codec.hpp"

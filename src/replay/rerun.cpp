@@ -1,6 +1,4 @@
 // Feeds a recorded run through the cycle's parts again, cycle by cycle.
-#include "replay/rerun.hpp"
-
 #include <bit>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,6 +7,7 @@
 #include "config/config_error.hpp"
 #include "config/live_settings.hpp"
 #include "config/plan.hpp"
+#include "replay/replay.hpp"
 #include "rig/parse_json.hpp"
 #include "run/run.hpp"
 #include "telemetry/message_codec.hpp"
@@ -40,11 +39,7 @@ bool same_duties(const rig::Command& a, const rig::Command& b) noexcept {
 class RecordedRig final : public driver::RigDriver {
  public:
   RecordedRig(const RecordedRun& run, const config::Settings& s)
-      : run_(run),
-        ideal_sensors_(s.plant.ideal_sensors),
-        injected_(!s.inject.empty()),
-        loses_commands_(s.backend == "rig"),
-        grid_(config::output_grid(s)) {}
+      : run_(run), settings_(s), grid_(config::output_grid(s)) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }
@@ -59,7 +54,9 @@ class RecordedRig final : public driver::RigDriver {
     truth_ = record.truth;
     // With ideal sensors the simulator hands its true speeds to the controller. Fault injections may have changed them;
     // then the estimates hold what the controller received.
-    if (ideal_sensors_) measurement.ideal_speeds = injected_ ? record.control.speeds_est : truth_.speeds;
+    if (settings_.plant.ideal_sensors) {
+      measurement.ideal_speeds = settings_.inject.empty() ? truth_.speeds : record.control.speeds_est;
+    }
     ++next_;
     return {};
   }
@@ -79,16 +76,14 @@ class RecordedRig final : public driver::RigDriver {
   /// failed and left the safe state.
   [[nodiscard]] bool not_taken(std::size_t n) const noexcept {
     const rig::Command recorded = command_at(n);
-    if (loses_commands_ && n > 0 && same_duties(recorded, command_at(n - 1))) return true;
+    if (settings_.on_rig() && n > 0 && same_duties(recorded, command_at(n - 1))) return true;
     const bool failed = n + 1 < run_.cycles.size() && ended_from_outside(run_, n + 1, WheelFaults::found_again);
     return failed && same_duties(recorded, rig::safe_command);
   }
   driver::IoResult do_make_safe() noexcept override { return {}; }
 
   const RecordedRun& run_;
-  bool ideal_sensors_;
-  bool injected_;
-  bool loses_commands_;
+  const config::Settings& settings_;
   driver::OutputGrid grid_;
   std::size_t next_{0};
   rig::PlantTruth truth_{};

@@ -103,6 +103,11 @@ struct Avx512 {
 #endif
 
 #define ABS_HIL_LANE_WISE [[gnu::always_inline]] friend inline
+/// Returns the pack or mask whose vector i is `vector`.
+#define ABS_HIL_EACH(Result, vectors, vector)                        \
+  Result r;                                                          \
+  for (std::size_t i = 0; i < Vectors; ++i) r.vectors[i] = (vector); \
+  return r
 
 /// A condition for each lane.
 template <class Isa, std::size_t Vectors>
@@ -110,20 +115,12 @@ struct PackMask {
   typename Isa::Mask m[Vectors];
 
   ABS_HIL_LANE_WISE PackMask operator&&(const PackMask& a, const PackMask& b) noexcept {
-    PackMask r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.m[i] = Isa::both(a.m[i], b.m[i]);
-    return r;
+    ABS_HIL_EACH(PackMask, m, Isa::both(a.m[i], b.m[i]));
   }
   ABS_HIL_LANE_WISE PackMask operator||(const PackMask& a, const PackMask& b) noexcept {
-    PackMask r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.m[i] = Isa::either(a.m[i], b.m[i]);
-    return r;
+    ABS_HIL_EACH(PackMask, m, Isa::either(a.m[i], b.m[i]));
   }
-  ABS_HIL_LANE_WISE PackMask operator!(const PackMask& a) noexcept {
-    PackMask r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.m[i] = Isa::neither(a.m[i]);
-    return r;
-  }
+  ABS_HIL_LANE_WISE PackMask operator!(const PackMask& a) noexcept { ABS_HIL_EACH(PackMask, m, Isa::neither(a.m[i])); }
   ABS_HIL_LANE_WISE bool any_lane(const PackMask& a) noexcept {
     typename Isa::Mask some = a.m[0];
     for (std::size_t i = 1; i < Vectors; ++i) some = Isa::either(some, a.m[i]);
@@ -154,9 +151,7 @@ struct Pack {
 
 #define ABS_HIL_ARITHMETIC(op)                                                \
   ABS_HIL_LANE_WISE Pack operator op(const Pack& a, const Pack& b) noexcept { \
-    Pack r;                                                                   \
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = a.v[i] op b.v[i];      \
-    return r;                                                                 \
+    ABS_HIL_EACH(Pack, v, a.v[i] op b.v[i]);                                  \
   }                                                                           \
   ABS_HIL_LANE_WISE Pack& operator op##=(Pack& a, const Pack& b) noexcept { return a = a op b; }
   ABS_HIL_ARITHMETIC(+)
@@ -164,12 +159,8 @@ struct Pack {
   ABS_HIL_ARITHMETIC(*)
   ABS_HIL_ARITHMETIC(/)
 #undef ABS_HIL_ARITHMETIC
-#define ABS_HIL_COMPARISON(op, call)                                          \
-  ABS_HIL_LANE_WISE Mask operator op(const Pack& a, const Pack& b) noexcept { \
-    Mask r;                                                                   \
-    for (std::size_t i = 0; i < Vectors; ++i) r.m[i] = call;                  \
-    return r;                                                                 \
-  }
+#define ABS_HIL_COMPARISON(op, call) \
+  ABS_HIL_LANE_WISE Mask operator op(const Pack& a, const Pack& b) noexcept { ABS_HIL_EACH(Mask, m, call); }
   ABS_HIL_COMPARISON(<, Isa::less(a.v[i], b.v[i]))
   ABS_HIL_COMPARISON(<=, Isa::less_equal(a.v[i], b.v[i]))
   ABS_HIL_COMPARISON(>, Isa::less(b.v[i], a.v[i]))
@@ -179,71 +170,40 @@ struct Pack {
 #undef ABS_HIL_COMPARISON
 
   ABS_HIL_LANE_WISE Pack operator-(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = (Vector)((Bits)a.v[i] ^ (Bits)Isa::all(-0.0));
-    return r;
+    ABS_HIL_EACH(Pack, v, (Vector)((Bits)a.v[i] ^ (Bits)Isa::all(-0.0)));
   }
   ABS_HIL_LANE_WISE Pack blend(const Mask& m, const Pack& a, const Pack& b) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = Isa::blend(m.m[i], a.v[i], b.v[i]);
-    return r;
+    ABS_HIL_EACH(Pack, v, Isa::blend(m.m[i], a.v[i], b.v[i]));
   }
   ABS_HIL_LANE_WISE Pack lane_larger(const Pack& a, const Pack& b) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = Isa::larger(a.v[i], b.v[i]);
-    return r;
+    ABS_HIL_EACH(Pack, v, Isa::larger(a.v[i], b.v[i]));
   }
   ABS_HIL_LANE_WISE Pack lane_smaller(const Pack& a, const Pack& b) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = Isa::smaller(a.v[i], b.v[i]);
-    return r;
+    ABS_HIL_EACH(Pack, v, Isa::smaller(a.v[i], b.v[i]));
   }
   ABS_HIL_LANE_WISE Pack lane_magnitude(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = (Vector)((Bits)a.v[i] & ~(Bits)Isa::all(-0.0));
-    return r;
+    ABS_HIL_EACH(Pack, v, (Vector)((Bits)a.v[i] & ~(Bits)Isa::all(-0.0)));
   }
   ABS_HIL_LANE_WISE Pack lane_with_sign(const Pack& a, const Pack& sign) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) {
-      const Bits bit = (Bits)Isa::all(-0.0);
-      r.v[i] = (Vector)(((Bits)a.v[i] & ~bit) | ((Bits)sign.v[i] & bit));
-    }
-    return r;
+    const Bits bit = (Bits)Isa::all(-0.0);
+    ABS_HIL_EACH(Pack, v, (Vector)(((Bits)a.v[i] & ~bit) | ((Bits)sign.v[i] & bit)));
   }
-  ABS_HIL_LANE_WISE Pack lane_round_down(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = Isa::floor(a.v[i]);
-    return r;
-  }
-  ABS_HIL_LANE_WISE Pack lane_square_root(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = Isa::root(a.v[i]);
-    return r;
-  }
+  ABS_HIL_LANE_WISE Pack lane_round_down(const Pack& a) noexcept { ABS_HIL_EACH(Pack, v, Isa::floor(a.v[i])); }
+  ABS_HIL_LANE_WISE Pack lane_square_root(const Pack& a) noexcept { ABS_HIL_EACH(Pack, v, Isa::root(a.v[i])); }
   ABS_HIL_LANE_WISE Pack lane_exponent_of(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) {
-      const Vector whole = Isa::all(0x1p52);
-      r.v[i] = ((Vector)(Isa::shifted_right((Bits)a.v[i]) | (Bits)whole) - whole) - Isa::all(1023.0);
-    }
-    return r;
+    const Vector whole = Isa::all(0x1p52);
+    ABS_HIL_EACH(Pack, v, ((Vector)(Isa::shifted_right((Bits)a.v[i]) | (Bits)whole) - whole) - Isa::all(1023.0));
   }
   ABS_HIL_LANE_WISE Pack lane_mantissa_of(const Pack& a) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) {
-      // 0x1p-1022 less its last bit has exactly the bits of the fraction.
-      r.v[i] = (Vector)(((Bits)a.v[i] & (Bits)Isa::all(0x0.fffffffffffffp-1022)) | (Bits)Isa::all(1.0));
-    }
-    return r;
+    // 0x1p-1022 less its last bit has exactly the bits of the fraction.
+    ABS_HIL_EACH(Pack, v, (Vector)(((Bits)a.v[i] & (Bits)Isa::all(0x0.fffffffffffffp-1022)) | (Bits)Isa::all(1.0)));
   }
   ABS_HIL_LANE_WISE Pack lane_power_of_two(const Pack& shifted) noexcept {
-    Pack r;
-    for (std::size_t i = 0; i < Vectors; ++i) r.v[i] = (Vector)(((Bits)shifted.v[i] << 52) + (Bits)Isa::all(1.0));
-    return r;
+    ABS_HIL_EACH(Pack, v, (Vector)(((Bits)shifted.v[i] << 52) + (Bits)Isa::all(1.0)));
   }
 };
 
+#undef ABS_HIL_EACH
 #undef ABS_HIL_LANE_WISE
 
 // Lanes in memory: a T<Pack> has the words of T<double>, each once for every lane.

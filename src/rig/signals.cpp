@@ -16,20 +16,16 @@ constexpr std::size_t name_max = 32;
 bool is_letter(char c) noexcept { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool is_of_name(char c) noexcept { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; }
 
+[[noreturn]] void refuse(std::string_view name, const char* why) {
+  throw std::invalid_argument("the controller's signal '" + std::string(name) + "' " + why);
+}
+
 }  // namespace
 
 bool is_signal_name(std::string_view name) noexcept {
   return !name.empty() && name.size() <= name_max && is_letter(name.front()) && std::ranges::all_of(name, is_of_name) &&
          !is_quantity(name);
 }
-
-namespace {
-
-[[noreturn]] void refuse(std::string_view name, const char* why) {
-  throw std::invalid_argument("the controller's signal '" + std::string(name) + "' " + why);
-}
-
-}  // namespace
 
 std::vector<std::string> signal_names(std::span<const Signal> signals) {
   if (signals.size() > signal_max) {

@@ -41,21 +41,6 @@ std::int64_t next_second_ns(std::int64_t now_ns) noexcept {
   return (now_ns / second_ns + 1) * second_ns;
 }
 
-/// Puts the rig in the safe state, however the run ends.
-class ActiveDriver {
- public:
-  ActiveDriver(driver::RigDriver& driver, std::int64_t now_ns) : driver_(driver) {
-    driver_.configure();
-    driver_.activate(now_ns);
-  }
-  ActiveDriver(const ActiveDriver&) = delete;
-  ActiveDriver& operator=(const ActiveDriver&) = delete;
-  ~ActiveDriver() { static_cast<void>(driver_.deactivate()); }
-
- private:
-  driver::RigDriver& driver_;
-};
-
 std::unique_ptr<runtime::Clock> clock_of(const Given& given) {
   if (given.clock != nullptr) return nullptr;
   if (given.real_time) return std::make_unique<runtime::MonotonicClock>();
@@ -210,7 +195,10 @@ bool Run::step() noexcept {
 }
 
 RunOutcome Run::run_fast(const Poll& poll, bool own_thread) {
-  const ActiveDriver active(driver_, clock_.now_ns());
+  begin();
+  // Puts the rig in the safe state, however the run ends.
+  const std::unique_ptr<driver::RigDriver, void (*)(driver::RigDriver*)> active(
+      &driver_, [](driver::RigDriver* driver) { static_cast<void>(driver->deactivate()); });
   const runtime::CycleInThisThread cycle(*this, own_thread);
   if (watch_slow_cycles_) slow_cycles_.emplace(executive_.period_ns());
   ran_ = true;

@@ -118,7 +118,7 @@ class Run final : private runtime::Outputs {
   /// For real-time runs: `guard` stands by from before the driver's activation until its outputs are released. Both
   /// must outlive the run.
   void guard_with(runtime::RunGuard& guard) noexcept { guard_ = &guard; }
-  void set_watch(runtime::CycleWatch& watch) noexcept { executive_.set_watch(watch); }
+  void set_watch(runtime::Heartbeat& watch) noexcept { executive_.set_watch(watch); }
   /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
   void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
   /// Lets go of the board, after the run.

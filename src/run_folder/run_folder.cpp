@@ -1,4 +1,4 @@
-// Creates a run's folder and seals it with checksums.
+// Creates a run's folder, seals it with checksums, and tells on what the run depended.
 #include "run_folder/run_folder.hpp"
 
 #include <fmt/chrono.h>
@@ -8,17 +8,57 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 #include <utility>
 #include <vector>
+#ifndef _WIN32
+#include <sys/utsname.h>
+#endif
 
+#include "abs_hil_revision.hpp"
 #include "files/result_file.hpp"
 #include "run_folder/sha256.hpp"
 
 namespace abs_hil::run_folder {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+std::string processor_model() {
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  for (std::string line; std::getline(cpuinfo, line);) {
+    if (!line.starts_with("model name")) continue;
+    const std::size_t colon = line.find(": ");
+    if (colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+struct System {
+  std::string host{"unknown"};
+  std::string kernel{"unknown"};
+  std::string machine{"unknown"};
+};
+
+System system_facts() {
+#ifdef _WIN32
+  const char* host = std::getenv("COMPUTERNAME");
+  const char* machine = std::getenv("PROCESSOR_ARCHITECTURE");
+  return {.host = host != nullptr ? host : "unknown",
+          .kernel = "Windows",
+          .machine = machine != nullptr ? machine : "unknown"};
+#else
+  utsname system{};
+  if (::uname(&system) != 0) return {};
+  return {system.nodename, fmt::format("{} {} {}", system.sysname, system.release, system.version), system.machine};
+#endif
+}
+
+}  // namespace
 
 RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
   std::error_code error;
@@ -100,17 +140,11 @@ fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::s
   return path;
 }
 
-namespace {
-
-constexpr std::size_t block_bytes = 262'144;
-
-}  // namespace
-
 std::string sha256_of_file(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   Sha256 sum;
-  std::vector<char> block(block_bytes);
+  std::vector<char> block(262'144);
   while (file) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     sum.add({block.data(), static_cast<std::size_t>(file.gcount())});
@@ -125,6 +159,38 @@ std::string sha256_of(std::string_view text) {
   Sha256 sum;
   sum.add(text);
   return sum.hex();
+}
+
+BuildFacts build_facts() {
+#ifdef __clang__
+  const std::string compiler = "clang " __clang_version__;
+#else
+  const std::string compiler = "gcc " __VERSION__;
+#endif
+  return {ABS_HIL_VERSION, ABS_HIL_REVISION, ABS_HIL_BUILD_TYPE, compiler};
+}
+
+nlohmann::ordered_json environment_json(const RunEnvironment& run) {
+  const BuildFacts build = build_facts();
+  const System system = system_facts();
+  std::error_code ignored;
+  return {
+      {"date_utc", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
+      {"command_line", run.command_line},
+      {"working_directory", std::filesystem::current_path(ignored).string()},
+      {"version", build.version},
+      {"git_revision", build.git_revision},
+      {"build_type", build.build_type},
+      {"compiler", build.compiler},
+      {"host", system.host},
+      {"kernel", system.kernel},
+      {"machine", system.machine},
+      {"processor", processor_model()},
+      {"processors", std::thread::hardware_concurrency()},
+      {"backend", run.backend},
+      {"board", {{"name", run.board}, {"emulated", run.emulated}, {"notes", run.board_notes}}},
+      {"real_time",
+       {{"virtual_time", run.virtual_time}, {"obtained", run.realtime}, {"shortcomings", run.realtime_shortcomings}}}};
 }
 
 }  // namespace abs_hil::run_folder

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "abs_hil/rig/time_units.hpp"
 
@@ -27,14 +26,10 @@ std::size_t bins_in_use(const Columns& columns) {
   return used;
 }
 
-void append_number(std::string& text, fmt::string_view format, std::uint64_t value) {
-  fmt::format_to(std::back_inserter(text), fmt::runtime(format), value);
-}
-
 template <typename Value>
-void append_line(std::string& text, const char* title, fmt::string_view format, const Columns& columns, Value value) {
+void append_line(std::string& text, const char* title, int digits, const Columns& columns, Value value) {
   text += title;
-  for (const LatencyHistogram* column : columns) append_number(text, format, value(*column));
+  for (const LatencyHistogram* column : columns) text += fmt::format(" {:0{}}", value(*column), digits);
   text += '\n';
 }
 
@@ -90,10 +85,6 @@ void CycleStatistics::add(const rig::CycleTiming& timing) noexcept {
   cycle_time_.add(timing.cycle_ns);
 }
 
-void CycleStatistics::count_cycle() noexcept { add_as_single_writer(cycles_, one); }
-
-void CycleStatistics::count_startup_overrun() noexcept { add_as_single_writer(startup_overruns_, one); }
-
 std::uint64_t CycleStatistics::count_overrun(rig::OverrunCause cause, std::uint64_t ticks_missed) noexcept {
   add_as_single_writer(overruns_[static_cast<std::size_t>(cause)], one);
   add_as_single_writer(ticks_missed_, ticks_missed);
@@ -130,20 +121,18 @@ std::string cyclictest_histogram(const CycleStatistics& statistics) {
       "# Histogram\n";
   const std::size_t used = bins_in_use(columns);
   for (std::size_t bin = 0; bin < used; ++bin) {
-    append_number(text, "{:06}", bin);
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      append_number(text, i == 0 ? " {:06}" : "\t{:06}", columns[i]->in_bin(bin));
-    }
-    text += '\n';
+    text +=
+        fmt::format("{:06} {:06}\t{:06}\t{:06}\t{:06}\t{:06}\n", bin, columns[0]->in_bin(bin), columns[1]->in_bin(bin),
+                    columns[2]->in_bin(bin), columns[3]->in_bin(bin), columns[4]->in_bin(bin));
   }
   using Histogram = const LatencyHistogram&;
   const auto us = [](std::int64_t ns) { return static_cast<std::uint64_t>(ns / rig::ns_per_us); };
-  append_line(text, "# Total:", " {:09}", columns, [](Histogram h) { return h.count() - h.overflows(); });
-  append_line(text, "# Min Latencies:", " {:05}", columns, [us](Histogram h) { return us(h.min_ns()); });
-  append_line(text, "# Avg Latencies:", " {:05}", columns,
+  append_line(text, "# Total:", 9, columns, [](Histogram h) { return h.count() - h.overflows(); });
+  append_line(text, "# Min Latencies:", 5, columns, [us](Histogram h) { return us(h.min_ns()); });
+  append_line(text, "# Avg Latencies:", 5, columns,
               [us](Histogram h) { return h.count() == 0 ? 0 : us(h.sum_ns() / static_cast<std::int64_t>(h.count())); });
-  append_line(text, "# Max Latencies:", " {:05}", columns, [us](Histogram h) { return us(h.max_ns()); });
-  append_line(text, "# Histogram Overflows:", " {:05}", columns, [](Histogram h) { return h.overflows(); });
+  append_line(text, "# Max Latencies:", 5, columns, [us](Histogram h) { return us(h.max_ns()); });
+  append_line(text, "# Histogram Overflows:", 5, columns, [](Histogram h) { return h.overflows(); });
   return text;
 }
 

@@ -53,11 +53,11 @@ class CycleStatistics {
  public:
   /// Adds the durations of one cycle. Do not call it for start-up cycles.
   void add(const rig::CycleTiming& timing) noexcept;
-  void count_cycle() noexcept;
+  void count_cycle() noexcept { add_as_single_writer(cycles_, std::uint64_t{1}); }
   /// @param ticks_missed whole periods skipped, >= 1
   /// @return how many cycles in a row have now been late
   std::uint64_t count_overrun(rig::OverrunCause cause, std::uint64_t ticks_missed) noexcept;
-  void count_startup_overrun() noexcept;
+  void count_startup_overrun() noexcept { add_as_single_writer(startup_overruns_, std::uint64_t{1}); }
   void count_cycle_in_time() noexcept { run_ = 0; }
 
   [[nodiscard]] std::uint64_t cycles() const noexcept { return cycles_.load(std::memory_order_relaxed); }

@@ -9,14 +9,37 @@
 #include "abs_hil/rig/option.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/command_gate.hpp"
-#include "runtime/cycle_logic.hpp"
 #include "runtime/cycle_statistics.hpp"
-#include "runtime/cycle_watch.hpp"
+#include "runtime/heartbeat.hpp"
 #include "runtime/spsc_ring.hpp"
 
 namespace abs_hil::runtime {
 
 using RecordRing = SpscRing<rig::CycleRecord>;
+
+/// The middle part of the cycle: estimate, sequence, control. The executive calls it. All functions run in the
+/// real-time thread: no allocation, lock, system call, exception or log call.
+class CycleLogic {
+ public:
+  CycleLogic() = default;
+  CycleLogic(const CycleLogic&) = delete;
+  CycleLogic& operator=(const CycleLogic&) = delete;
+  virtual ~CycleLogic() = default;
+
+  /// Tells, before `step`, whether the checks of the wheels are free of doubt about the measurement. While they doubt
+  /// it, or a verdict is due, a run does not count as complete.
+  virtual void wheels_judged(bool sound) noexcept = 0;
+  /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value`, `.wheels_apart` and
+  /// `.control`, and returns the command wanted. A pure function of measurements and latch so far.
+  /// @param latch  asked whether the run must end; faults found here are latched. The brake may hold after a fault
+  ///   (`gate.fault_brake_duty`); a further fault that bars it ends this
+  [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, RunLatch& latch,
+                                          rig::CycleRecord& record) noexcept = 0;
+  /// Takes the command that the rig now executes: as the driver sent it, after gate, limits and the PWM's steps.
+  virtual void commanded(const rig::Command& sent) noexcept = 0;
+  /// True if the latest step was the run's last.
+  [[nodiscard]] virtual bool finished() const noexcept = 0;
+};
 
 /// Which late cycles count, and which end the run.
 struct OverrunOptions {
@@ -56,7 +79,7 @@ class CyclicExecutive {
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
   /// Makes each cycle beat, feed the flight recorder, and latch a fault when the guardian is lost. `watch` must
   /// outlive the last step. Call it before the first step.
-  void set_watch(CycleWatch& watch) noexcept { watch_ = &watch; }
+  void set_watch(Heartbeat& watch) noexcept { watch_ = &watch; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
   /// Ends the run in order at the next cycle. Any thread or signal handler may call it. The first reason stays.
@@ -84,7 +107,7 @@ class CyclicExecutive {
   CycleLogic& logic_;
   CommandGate& gate_;
   RecordRing& ring_;
-  CycleWatch* watch_{nullptr};
+  Heartbeat* watch_{nullptr};
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;

@@ -17,6 +17,8 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "runtime/realtime_setup.hpp"
+
 namespace abs_hil::runtime {
 
 namespace {
@@ -160,9 +162,7 @@ CycleInThisThread::~CycleInThisThread() {
 }
 
 void SlowCycleWatch::watch() {
-  sigset_t all{};
-  sigfillset(&all);
-  ::pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  keep_signals_away();
   std::uint64_t seen = 0;
   double same_s = 0.0;
   double whole_s = 0.0;

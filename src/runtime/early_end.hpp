@@ -56,8 +56,6 @@ class SlowCycleWatch {
   /// @param period_ns  of virtual time; 0: real time, which limits no whole
   explicit SlowCycleWatch(std::int64_t period_ns)
       : period_s_(static_cast<double>(period_ns) * 1e-9), thread_([this] { watch(); }) {}
-  SlowCycleWatch(const SlowCycleWatch&) = delete;
-  SlowCycleWatch& operator=(const SlowCycleWatch&) = delete;
   ~SlowCycleWatch() {
     {
       const std::lock_guard lock(mutex_);

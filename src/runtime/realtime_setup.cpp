@@ -17,7 +17,8 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+
+#include "driver/sysfs.hpp"
 
 namespace abs_hil::runtime {
 
@@ -73,16 +74,8 @@ constexpr std::size_t heap_bytes = 4U << 20U;
 constexpr std::size_t stack_bytes = 256U << 10U;
 constexpr std::size_t page_bytes = 4096;
 
-/// "VmLck" of /proc/self/status, kB; 0 if it cannot be read.
-long locked_kB() {
-  std::ifstream status("/proc/self/status");
-  std::string field;
-  while (status >> field) {
-    long kB = 0;
-    if (field == "VmLck:" && status >> kB) return kB;
-  }
-  return 0;
-}
+/// Memory of this process that is locked, kB; 0 if that cannot be read.
+long locked_kB() { return std::strtol(driver::value_in("/proc/self/status", "VmLck:").c_str(), nullptr, 10); }
 
 void touch(volatile unsigned char* memory, std::size_t bytes) {
   for (std::size_t at = 0; at < bytes; at += page_bytes) memory[at] = 0;
@@ -114,37 +107,34 @@ long touch_heap() {
   return count;
 }
 
-RealtimeStep judged(RealtimeStep step, long faults_when_repeated) {
-  step.obtained = faults_when_repeated == 0;
-  if (faults_when_repeated < 0) {
-    step.detail = "cannot allocate memory: the limit for locked memory (RLIMIT_MEMLOCK) is too low";
-    step.fix = privilege_fix();
-  } else {
-    step.detail = std::to_string(faults_when_repeated) + " page faults when touched again";
-    if (!step.obtained) step.fix = privilege_fix();
-  }
-  return step;
+RealtimeStep judged(const char* what, long faults_when_repeated) {
+  const bool obtained = faults_when_repeated == 0;
+  return {.what = what,
+          .obtained = obtained,
+          .detail = faults_when_repeated < 0
+                        ? "cannot allocate memory: the limit for locked memory (RLIMIT_MEMLOCK) is too low"
+                        : std::to_string(faults_when_repeated) + " page faults when touched again",
+          .fix = obtained ? "" : privilege_fix()};
+}
+
+/// The limit, divided by `unit`.
+std::string limit_text(__rlimit_resource resource, rlim_t unit, const char* unit_text) {
+  rlimit limit{};
+  if (getrlimit(resource, &limit) != 0) return "unknown";
+  return limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur / unit) + unit_text;
 }
 
 /// Locks all memory of this process, present and future.
 RealtimeStep lock_memory() {
-  RealtimeStep step{.what = "memory locked (mlockall)"};
-  const int result = mlockall(MCL_CURRENT | MCL_FUTURE);
-  const int error = errno;
+  const int error = mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
   const long kB = locked_kB();
-  step.obtained = result == 0 && kB > 0;
-  if (step.obtained) {
-    step.detail = std::to_string(kB / 1024) + " MB locked";
-  } else {
-    rlimit limit{};
-    getrlimit(RLIMIT_MEMLOCK, &limit);
-    step.detail = result != 0 ? std::strerror(error) : "the kernel shows no locked memory";
-    step.detail += " (RLIMIT_MEMLOCK " +
-                   (limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur / 1024) + " kB") +
-                   ")";
-    step.fix = privilege_fix();
-  }
-  return step;
+  const bool obtained = error == 0 && kB > 0;
+  const std::string lacks = error != 0 ? std::strerror(error) : "the kernel shows no locked memory";
+  return {.what = "memory locked (mlockall)",
+          .obtained = obtained,
+          .detail = obtained ? std::to_string(kB / 1024) + " MB locked"
+                             : lacks + " (RLIMIT_MEMLOCK " + limit_text(RLIMIT_MEMLOCK, 1024, " kB") + ")",
+          .fix = obtained ? "" : privilege_fix()};
 }
 
 /// Grows the heap once, touches it, and keeps it from shrinking.
@@ -156,23 +146,16 @@ RealtimeStep prefault_heap() {
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);
   static_cast<void>(touch_heap());
-  return judged({.what = "heap prefaulted, 4 MB"}, touch_heap());
+  return judged("heap prefaulted, 4 MB", touch_heap());
 }
 
 /// Touches the part of the calling thread's stack that a cycle may use.
 RealtimeStep prefault_stack() {
   static_cast<void>(touch_stack());
-  return judged({.what = "stack prefaulted, 256 kB"}, touch_stack());
-}
-
-std::string limit_text(int resource) {
-  rlimit limit{};
-  if (getrlimit(static_cast<__rlimit_resource>(resource), &limit) != 0) return "unknown";
-  return limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur);
+  return judged("stack prefaulted, 256 kB", touch_stack());
 }
 
 RealtimeStep schedule_fifo(int priority) {
-  RealtimeStep step{.what = "SCHED_FIFO priority " + std::to_string(priority)};
   sched_param wanted{};
   wanted.sched_priority = priority;
   // pthread functions return their error and leave errno alone.
@@ -180,19 +163,16 @@ RealtimeStep schedule_fifo(int priority) {
   int policy = SCHED_OTHER;
   sched_param got{};
   const int get_error = pthread_getschedparam(pthread_self(), &policy, &got);
-  step.obtained = set_error == 0 && get_error == 0 && policy == SCHED_FIFO && got.sched_priority == priority;
-  if (step.obtained) {
-    step.detail = "read back from the scheduler";
-  } else {
-    step.detail = set_error != 0 ? std::strerror(set_error) : "the scheduler kept another policy";
-    step.detail += " (RLIMIT_RTPRIO " + limit_text(RLIMIT_RTPRIO) + ")";
-    step.fix = fifo_fix(priority);
-  }
-  return step;
+  const bool obtained = set_error == 0 && get_error == 0 && policy == SCHED_FIFO && got.sched_priority == priority;
+  const std::string lacks = set_error != 0 ? std::strerror(set_error) : "the scheduler kept another policy";
+  return {.what = "SCHED_FIFO priority " + std::to_string(priority),
+          .obtained = obtained,
+          .detail = obtained ? "read back from the scheduler"
+                             : lacks + " (RLIMIT_RTPRIO " + limit_text(RLIMIT_RTPRIO, 1, "") + ")",
+          .fix = obtained ? "" : fifo_fix(priority)};
 }
 
 RealtimeStep bind_to_cpu(int cpu) {
-  RealtimeStep step{.what = "bound to CPU " + std::to_string(cpu)};
   cpu_set_t wanted;
   CPU_ZERO(&wanted);
   CPU_SET(static_cast<std::size_t>(cpu), &wanted);
@@ -200,27 +180,27 @@ RealtimeStep bind_to_cpu(int cpu) {
   cpu_set_t got;
   CPU_ZERO(&got);
   const int get_error = pthread_getaffinity_np(pthread_self(), sizeof got, &got);
-  step.obtained = set_error == 0 && get_error == 0 && CPU_EQUAL(&wanted, &got);
-  if (step.obtained) {
-    step.detail = "runs on CPU " + std::to_string(sched_getcpu());
-  } else {
-    step.detail = set_error == EINVAL ? "this CPU does not exist, or this process may not use it"
-                                      : std::strerror(set_error != 0 ? set_error : get_error);
-    step.fix = "taskset -cp $$   # shows the CPUs that may be used; then --set realtime.cpu=N, or -1 for any";
-  }
-  return step;
+  const bool obtained = set_error == 0 && get_error == 0 && CPU_EQUAL(&wanted, &got);
+  const char* const fix =
+      "taskset -cp $$   # shows the CPUs that may be used; then --set realtime.cpu=N, or -1 for any";
+  return {.what = "bound to CPU " + std::to_string(cpu),
+          .obtained = obtained,
+          .detail = obtained              ? "runs on CPU " + std::to_string(sched_getcpu())
+                    : set_error == EINVAL ? "this CPU does not exist, or this process may not use it"
+                                          : std::strerror(set_error != 0 ? set_error : get_error),
+          .fix = obtained ? "" : fix};
 }
 
 RealtimeStep least_timer_slack() {
-  RealtimeStep step{.what = "timer slack 1 ns", .required = false};
   constexpr unsigned long least_ns = 1;  // 0 would mean the default, 50 us
-  const int set = prctl(PR_SET_TIMERSLACK, least_ns, 0, 0, 0);
-  const int error = errno;
+  const int error = prctl(PR_SET_TIMERSLACK, least_ns, 0, 0, 0) == 0 ? 0 : errno;
   const int got_ns = prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0);
-  step.obtained = set == 0 && got_ns >= 0 && got_ns <= static_cast<int>(least_ns);
-  step.detail = set == 0 ? "slack is " + std::to_string(got_ns) + " ns" : std::strerror(error);
-  if (!step.obtained) step.fix = "no fix needed: timer slack does not apply under SCHED_FIFO";
-  return step;
+  const bool obtained = error == 0 && got_ns >= 0 && got_ns <= static_cast<int>(least_ns);
+  return {.what = "timer slack 1 ns",
+          .obtained = obtained,
+          .required = false,
+          .detail = error == 0 ? "slack is " + std::to_string(got_ns) + " ns" : std::strerror(error),
+          .fix = obtained ? "" : "no fix needed: timer slack does not apply under SCHED_FIFO"};
 }
 
 }  // namespace
@@ -288,21 +268,23 @@ RealtimeScope::~RealtimeScope() {
 // written (us): Documentation/power/pm_qos_interface.rst.
 void RealtimeScope::hold_cpu_latency() {
   constexpr const char* device = "/dev/cpu_dma_latency";
-  RealtimeStep step{.what = std::string(device) + " held at 0", .required = false};
   errno = 0;
   cpu_latency_file_ = ::open(device, O_RDWR | O_CLOEXEC);
   constexpr std::int32_t none_us = 0;
   std::int32_t got_us = -1;
   const bool written = cpu_latency_file_ >= 0 && ::write(cpu_latency_file_, &none_us, sizeof none_us) == sizeof none_us;
   const int error = errno;
-  step.obtained = written && ::pread(cpu_latency_file_, &got_us, sizeof got_us, 0) == sizeof got_us && got_us == 0;
-  if (step.obtained) {
-    step.detail = "the kernel's limit reads 0 us";
-  } else {
-    step.detail = written ? "the kernel's limit is still " + std::to_string(got_us) + " us" : std::strerror(error);
-    step.fix = error == ENOENT ? "no fix: this kernel has no CPU latency control (CONFIG_CPU_IDLE)" : cpu_latency_fix();
-  }
-  report_.steps.push_back(std::move(step));
+  const bool obtained =
+      written && ::pread(cpu_latency_file_, &got_us, sizeof got_us, 0) == sizeof got_us && got_us == 0;
+  const std::string fix =
+      error == ENOENT ? "no fix: this kernel has no CPU latency control (CONFIG_CPU_IDLE)" : cpu_latency_fix();
+  report_.steps.push_back({.what = std::string(device) + " held at 0",
+                           .obtained = obtained,
+                           .required = false,
+                           .detail = obtained  ? "the kernel's limit reads 0 us"
+                                     : written ? "the kernel's limit is still " + std::to_string(got_us) + " us"
+                                               : std::strerror(error),
+                           .fix = obtained ? "" : fix});
 }
 
 }  // namespace abs_hil::runtime

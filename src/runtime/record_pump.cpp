@@ -10,10 +10,6 @@
 
 namespace abs_hil::runtime {
 
-namespace {
-constexpr std::int64_t message_period_ns = rig::ns_per_s;
-}  // namespace
-
 RecordPump::RecordPump(RecordRing& ring, double r2_m, std::vector<rig::RecordSink*> sinks)
     : ring_(ring), r2_m_(r2_m), sinks_(std::move(sinks)) {}
 
@@ -44,11 +40,10 @@ void RecordPump::finish() {
 void OverrunReporter::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   // The next record tells what a cycle missed. If a record was dropped, the late cycle's own times are lost.
   if (record.timing.periods_skipped > 0 && record.sequence == latest_.sequence + 1) {
-    late_ = LateCycle{.timing = latest_.timing,
-                      .record_ns = record.timing.record_ns,
-                      .ticks_missed = record.timing.periods_skipped,
-                      .cause = record.timing.overrun_cause,
-                      .time_s = latest_.time_s};
+    late_ = latest_;
+    late_->timing.record_ns = record.timing.record_ns;
+    late_->timing.periods_skipped = record.timing.periods_skipped;
+    late_->timing.overrun_cause = record.timing.overrun_cause;
   }
   latest_ = record;
 }
@@ -56,18 +51,19 @@ void OverrunReporter::consume(const rig::CycleRecord& record, double /*distance_
 std::optional<std::string> OverrunReporter::message(const rig::OverrunCounts& counts) {
   if (counts.total <= told_ || !late_) return std::nullopt;
   if (next_message_ns_ && latest_.stamp_ns < *next_message_ns_) return std::nullopt;
-  next_message_ns_ = latest_.stamp_ns + message_period_ns;
+  next_message_ns_ = latest_.stamp_ns + rig::ns_per_s;
 
-  const auto cause = [&counts](rig::OverrunCause of) { return counts.of(of); };
+  using rig::OverrunCause;
+  const rig::CycleTiming& late = late_->timing;
   std::string text = fmt::format(
       "{} late cycles ({} new; wakeup {}, read {}, control {}, write {}, record {}), {} ticks missed; the latest at "
       "{:.3f} s missed {} because of {}: period {:.0f} us, woke {:.0f} us late, read {:.0f}, control {:.0f}, write "
       "{:.0f}, record {:.0f} us",
-      counts.total, counts.total - told_, cause(rig::OverrunCause::wakeup), cause(rig::OverrunCause::read),
-      cause(rig::OverrunCause::control), cause(rig::OverrunCause::write), cause(rig::OverrunCause::record),
-      counts.ticks_missed, late_->time_s, late_->ticks_missed, rig::name_of(late_->cause), rig::in_us(period_ns_),
-      rig::in_us(late_->timing.wakeup_latency_ns), rig::in_us(late_->timing.read_ns),
-      rig::in_us(late_->timing.control_ns), rig::in_us(late_->timing.write_ns), rig::in_us(late_->record_ns));
+      counts.total, counts.total - told_, counts.of(OverrunCause::wakeup), counts.of(OverrunCause::read),
+      counts.of(OverrunCause::control), counts.of(OverrunCause::write), counts.of(OverrunCause::record),
+      counts.ticks_missed, late_->time_s, late.periods_skipped, rig::name_of(late.overrun_cause),
+      rig::in_us(period_ns_), rig::in_us(late.wakeup_latency_ns), rig::in_us(late.read_ns), rig::in_us(late.control_ns),
+      rig::in_us(late.write_ns), rig::in_us(late.record_ns));
   told_ = counts.total;
   late_.reset();  // the counters run ahead of the records: the next message needs the record of another late cycle
   return text;

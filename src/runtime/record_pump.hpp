@@ -52,17 +52,9 @@ class OverrunReporter final : public rig::RecordSink {
   [[nodiscard]] std::optional<std::string> message(const rig::OverrunCounts& counts);
 
  private:
-  struct LateCycle {
-    rig::CycleTiming timing{};  ///< of the late cycle itself
-    std::int64_t record_ns{0};
-    std::uint32_t ticks_missed{0};
-    rig::OverrunCause cause{rig::OverrunCause::none};
-    double time_s{0.0};
-  };
-
   std::int64_t period_ns_;
   rig::CycleRecord latest_{};
-  std::optional<LateCycle> late_{};
+  std::optional<rig::CycleRecord> late_{};  ///< the latest late cycle, with what the next record told of it
   std::uint64_t told_{0};
   std::optional<std::int64_t> next_message_ns_{};
 };

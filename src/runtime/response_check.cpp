@@ -3,14 +3,10 @@
 
 namespace abs_hil::runtime {
 
-ResponseCheck::ResponseCheck(const PlausibilityLimits& limits) noexcept : watch_(limits) {}
-
-void ResponseCheck::note_wheels_apart(bool apart) noexcept { watch_.note_wheels_apart(apart); }
-
 CheckResult ResponseCheck::update(const SpeedWindow& speed_window, double brake_Nm) noexcept {
   using rig::Reason;
-  if (!watch_.take(speed_window, brake_Nm)) return {};
-  const auto verdict = watch_.conclude(true);
+  if (!take(speed_window, brake_Nm)) return {};
+  const auto verdict = conclude(true);
   if (!verdict.due) return {};
   if (verdict.rises) return {Reason::speed_rises_with_motor_off, verdict.gained_kg_m_s};
   if (verdict.motor_silent) return {Reason::motor_no_response, verdict.gained_kg_m_s};

@@ -175,17 +175,11 @@ auto MomentumWatch<S>::judge(const Window& before, const Window& now) const noex
 }
 
 /// The same as one check: what it found, with its reason.
-class ResponseCheck {
+class ResponseCheck : public MomentumWatch<double> {
  public:
-  explicit ResponseCheck(const PlausibilityLimits& limits) noexcept;
-
+  using MomentumWatch::MomentumWatch;
   /// @param brake_Nm expected brake torque
   CheckResult update(const SpeedWindow& speed_window, double brake_Nm) noexcept;
-  void note_wheels_apart(bool apart) noexcept;
-  [[nodiscard]] const MomentumWatch<double>& watch() const noexcept { return watch_; }
-
- private:
-  MomentumWatch<double> watch_;
 };
 
 }  // namespace abs_hil::runtime

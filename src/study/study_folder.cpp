@@ -14,7 +14,6 @@
 #include "config/key_table.hpp"
 #include "files/result_file.hpp"
 #include "rig/parse_json.hpp"
-#include "run_folder/environment.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
 

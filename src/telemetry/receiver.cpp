@@ -24,8 +24,21 @@ std::string well_formed(std::string url) {
 }  // namespace
 
 Receiver::Receiver(std::string url, std::string channels, Take take)
-    : network_(well_formed(std::move(url))), channels_(std::move(channels)), take_(std::move(take)) {
+    : own_(std::in_place, well_formed(std::move(url))),
+      network_(*own_),
+      channels_(std::move(channels)),
+      take_(std::move(take)) {
   subscribe();
+}
+
+Receiver::Receiver(LcmOutlet& network, std::string channels, Take take)
+    : network_(network), channels_(std::move(channels)), take_(std::move(take)) {
+  subscribe();
+}
+
+Receiver::~Receiver() {
+  // A network of its own unsubscribes by itself; with tcpq an explicit call would search for the server again.
+  if (!own_) lcm_unsubscribe(network_.lcm().getUnderlyingLCM(), subscription_);
 }
 
 void Receiver::subscribe() {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -21,8 +22,11 @@ class Receiver {
   /// URL, and LcmError when there is no route, LCM does not start, or it refuses the expression. `take` may throw
   /// std::bad_alloc only; poll() throws it again.
   Receiver(std::string url, std::string channels, Take take);
+  /// The same on a network that outlives it. memq delivers within one object only.
+  Receiver(LcmOutlet& network, std::string channels, Take take);
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
+  ~Receiver();
 
   /// File descriptor for poll(2); negative while there is no tcpq server.
   [[nodiscard]] int file_descriptor() noexcept { return network_.lcm().getFileno(); }
@@ -37,7 +41,8 @@ class Receiver {
   /// Connects tcpq again, at most once a second.
   void look_for_server();
 
-  LcmOutlet network_;
+  std::optional<LcmOutlet> own_{};
+  LcmOutlet& network_;
   std::string channels_;
   Take take_;
   std::chrono::steady_clock::time_point next_look_{};

@@ -161,12 +161,6 @@ TEST_CASE("a row may list its values") {
   CHECK(error_of(answer_of(number, {"--bit", "02"})) == "none");  // the number 2, not the text
   CHECK(bit == 2);
   CHECK(error_of(answer_of(number, {"--bit", "1"})) == "--bit: 1 not in {0,2}");
-  int format = 0;
-  const cli::Option word{.names = "--format", .to = &format, .help = "", .words = {{"pdf", 2}, {"png", 1}}};
-  CHECK(error_of(answer_of(word, {"--format", "pdf"})) == "none");
-  CHECK(format == 2);
-  CHECK(error_of(answer_of(word, {"--format", "gif"})) ==
-        "--format: Check gif value in {pdf->2,png->1} OR {2,1} FAILED");
 }
 
 TEST_CASE("a list takes all values that follow, or one each time") {
@@ -178,10 +172,6 @@ TEST_CASE("a list takes all values that follow, or one each time") {
   CHECK(error_of(answer_of(repeated, {"--set", "a=1", "--set", "b=2"})) == "none");
   CHECK(each == Texts{"a=1", "b=2"});
   CHECK(error_of(answer_of(repeated, {"--set", "a=1", "b=2"})) == "unexpected argument b=2");
-  Texts split;
-  const cli::Option commas{.names = "--columns", .to = &split, .help = "", .delimiter = ','};
-  CHECK(error_of(answer_of(commas, {"--columns", "a,b"})) == "none");
-  CHECK(split == Texts{"a", "b"});
   std::string once;
   CHECK(error_of(answer_of({.names = "--out", .to = &once, .help = ""}, {"--out", "a", "--out", "b"})) ==
         "--out: At Most 1 required but received 2");

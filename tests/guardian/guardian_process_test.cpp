@@ -18,8 +18,10 @@ namespace {
 std::string held_up_guardian(const std::filesystem::path& folder) {
   const std::string program = folder / "abs_guardian";
   const std::string ready = std::to_string(inherited_ready);
-  std::ofstream(program) << "#!/bin/sh\nprintf 'ready 0 0:' >&" << ready << "\nexec " << ready
-                         << ">&-\nexec sleep 20\n";
+  // LeaseMessage{.word = LeaseWord::ready}: magic, word, then zeros.
+  std::ofstream(program) << R"(#!/bin/sh
+printf '2ael\005\000\000\000\000\000\000\000\000\000\000\000' >&)"
+                         << ready << "\nexec " << ready << ">&-\nexec sleep 20\n";
   ::chmod(program.c_str(), S_IRWXU);
   return program;
 }

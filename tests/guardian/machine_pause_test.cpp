@@ -1,11 +1,10 @@
 // ClockLead on clocks that are drawn: each pause is found once, and nothing else is taken for one.
-#include "guardian/machine_pause.hpp"
-
 #include <cmath>
 #include <cstdint>
 #include <random>
 
 #include "catch.hpp"
+#include "guardian/machine.hpp"
 
 using abs_hil::guardian::ClockLead;
 

@@ -60,7 +60,10 @@ class World {
                       .page = page_,
                       .listener = listener_.get(),
                       .board = "board",
-                      .identify = [](int, int pidfd) { return Peer{.pid = pid_behind(pidfd)}; },
+                      .identify =
+                          [](int, int pidfd) {
+                            return Peer{pid_behind(pidfd), 0, 0};
+                          },
                       .read_terms = [](const std::string& text,
                                        const Peer&) { return LeaseTerms{.timeout_ns = 20 * ms, .board = text}; },
                       .tell = [](const std::string&) {},

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "catch.hpp"
-#include "guardian/launch_config.hpp"
+#include "guardian/guard.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::guardian;

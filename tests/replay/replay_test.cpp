@@ -1,4 +1,6 @@
 // Runs recorded by the program's own parts: replayed, checked, and damaged.
+#include "replay/replay.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -14,7 +16,6 @@
 #include "driver/injection/injecting_driver.hpp"
 #include "driver/injection/injection.hpp"
 #include "experiment/simulated_run.hpp"
-#include "replay/rerun.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"

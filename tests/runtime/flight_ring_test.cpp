@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "guardian/heartbeat.hpp"
+#include "runtime/heartbeat.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;
@@ -90,11 +90,11 @@ TEST_CASE("two seconds at the cycle's rate") {
 
 TEST_CASE("each cycle beats before it writes, and leaves its record") {
   Bench bench;
-  guardian::RunPage run;
-  guardian::GuardPage guard;
+  runtime::RunPage run;
+  runtime::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  guardian::Heartbeat heartbeat(run, guard, recorder);
+  runtime::Heartbeat heartbeat(run, guard, recorder);
   bench.executive.set_watch(heartbeat);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     bench.cycle();
@@ -109,11 +109,11 @@ TEST_CASE("each cycle beats before it writes, and leaves its record") {
 TEST_CASE("a guardian without heartbeat for the limit of cycles is a fault, a slow one is not") {
   constexpr std::uint64_t limit = 5;
   Bench bench;
-  guardian::RunPage run;
-  guardian::GuardPage guard;
+  runtime::RunPage run;
+  runtime::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  guardian::Heartbeat heartbeat(run, guard, recorder, limit);
+  runtime::Heartbeat heartbeat(run, guard, recorder, limit);
   bench.executive.set_watch(heartbeat);
   for (int n = 0; n < 40; ++n) {
     if (n % 4 == 0) guard.guardian_beats.store(guard.guardian_beats.load() + 1);
@@ -130,11 +130,11 @@ TEST_CASE("a guardian without heartbeat for the limit of cycles is a fault, a sl
 
 TEST_CASE("a run without a guardian has no guardian fault") {
   Bench bench;
-  guardian::RunPage run;
-  guardian::GuardPage guard;
+  runtime::RunPage run;
+  runtime::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  guardian::Heartbeat heartbeat(run, guard, recorder, 0);
+  runtime::Heartbeat heartbeat(run, guard, recorder, 0);
   bench.executive.set_watch(heartbeat);
   for (int n = 0; n < 100; ++n) REQUIRE(bench.cycle());
 }

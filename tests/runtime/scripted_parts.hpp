@@ -8,7 +8,6 @@
 #include "abs_hil/driver/rig_driver.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/command_gate.hpp"
-#include "runtime/cycle_logic.hpp"
 #include "runtime/cyclic_executive.hpp"
 
 namespace abs_hil::runtime::test {

@@ -3,8 +3,8 @@
 #include <array>
 
 #include "catch.hpp"
-#include "guardian/heartbeat.hpp"
 #include "runtime/cyclic_executive.hpp"
+#include "runtime/heartbeat.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;
@@ -13,11 +13,11 @@ using namespace abs_hil::runtime::test;
 
 TEST_CASE("a cycle that finds the guardian's mark sends the safe command and ends the run with its reason") {
   Bench bench;
-  guardian::RunPage run;
-  guardian::GuardPage guard;
+  runtime::RunPage run;
+  runtime::GuardPage guard;
   std::array<FlightSlot, 4> slots;
   FlightRing recorder(slots);
-  guardian::Heartbeat heartbeat(run, guard, recorder);
+  runtime::Heartbeat heartbeat(run, guard, recorder);
   bench.executive.set_watch(heartbeat);
   bench.cycle();
   CHECK(bench.driver.written.back().brake_duty == 0.5);
@@ -29,11 +29,11 @@ TEST_CASE("a cycle that finds the guardian's mark sends the safe command and end
 
 TEST_CASE("after a pause of the whole computer the pause is the reason, not the mark that it led to") {
   Bench bench({.startup_cycles = 0, .max_consecutive = 0});
-  guardian::RunPage run;
-  guardian::GuardPage guard;
+  runtime::RunPage run;
+  runtime::GuardPage guard;
   std::array<FlightSlot, 4> slots;
   FlightRing recorder(slots);
-  guardian::Heartbeat heartbeat(run, guard, recorder);
+  runtime::Heartbeat heartbeat(run, guard, recorder);
   bench.executive.set_watch(heartbeat);
   bench.cycle();
   bench.cycle();

@@ -6,9 +6,9 @@
 
 #include "driver/injection/injecting_driver.hpp"
 #include "experiment/simulated_run.hpp"
-#include "guardian/heartbeat.hpp"
 #include "kept_files.hpp"
 #include "matrix_rig.hpp"
+#include "runtime/heartbeat.hpp"
 #include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::experiment::test {
@@ -40,9 +40,9 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   });
   std::vector<runtime::FlightSlot> slots(recorder_slots);
   runtime::FlightRing flight(slots);
-  guardian::RunPage page;
-  const guardian::GuardPage guard_page;
-  guardian::Heartbeat heartbeat(page, guard_page, flight);
+  runtime::RunPage page;
+  const runtime::GuardPage guard_page;
+  runtime::Heartbeat heartbeat(page, guard_page, flight);
   Recorder recorder;
   telemetry::CsvSink csv(folder / "run.csv");
   SetupRun run(setup, {.clock = &clock, .driver = &driver});

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "experiment/simulated_run.hpp"
-#include "guardian/heartbeat.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::runtime::test {
 
@@ -80,9 +80,9 @@ class CycleRun {
   RecordRing ring_;
   std::vector<FlightSlot> slots_;
   FlightRing recorder_;
-  guardian::RunPage page_{};
-  guardian::GuardPage guard_page_{};
-  guardian::Heartbeat heartbeat_;
+  runtime::RunPage page_{};
+  runtime::GuardPage guard_page_{};
+  runtime::Heartbeat heartbeat_;
   CyclicExecutive executive_;
 };
 

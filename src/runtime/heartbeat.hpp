@@ -3,11 +3,30 @@
 #include <atomic>
 #include <cstdint>
 
+#include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/reason.hpp"
-#include "runtime/cycle_watch.hpp"
 #include "runtime/flight_ring.hpp"
 
-namespace abs_hil::guardian {
+namespace abs_hil::runtime {
+
+/// What a thread has of the real-time set-up, as the kernel tells it.
+struct Scheduling {
+  int fifo_priority{0};       ///< SCHED_FIFO priority; 0: another policy
+  bool memory_locked{false};  ///< some memory of its process is locked
+  /// True if a thread that needs `other` can be supervised from here: neither weaker in the scheduler nor in memory.
+  [[nodiscard]] constexpr bool at_least(const Scheduling& other) const noexcept {
+    return fifo_priority >= other.fifo_priority && (memory_locked || !other.memory_locked);
+  }
+};
+
+/// What a cycle learns from its guardian when it beats.
+struct GuardianSign {
+  /// Why the run must end: `guardian_silent`, or what the guardian takes the outputs back for; `none`: it may drive
+  /// them.
+  rig::Reason reason{rig::Reason::none};
+  std::uint64_t silent_cycles{0};  ///< cycles since the guardian's last sign of life
+};
 
 /// State of the run's outputs, as the run tells its guard. The guard believes `released` and `closed` only after it has
 /// read the board back, and takes any other number for `guarded`.
@@ -40,15 +59,16 @@ struct GuardPage {
 static_assert(std::atomic<rig::Reason>::is_always_lock_free && std::atomic<Stage>::is_always_lock_free &&
               std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-/// The cycle's side of the supervision. Real-time safe.
-class Heartbeat final : public runtime::CycleWatch {
+/// The cycle's side of the supervision: the guardian's heartbeat and the flight recorder. Real-time safe.
+class Heartbeat {
  public:
   /// @param silent_cycles_max  the guardian counts as lost after this number of silent cycles; 0: no guardian
-  Heartbeat(RunPage& ours, const GuardPage& guard, runtime::FlightRing& recorder,
-            std::uint64_t silent_cycles_max = 0) noexcept
+  Heartbeat(RunPage& ours, const GuardPage& guard, FlightRing& recorder, std::uint64_t silent_cycles_max = 0) noexcept
       : ours_(ours), guard_(guard), recorder_(recorder), silent_cycles_max_(silent_cycles_max) {}
 
-  [[nodiscard]] runtime::GuardianSign beat() noexcept override {
+  /// Beats and looks at the guardian. Call it once, at the start of a cycle, before any read or write, so that the
+  /// guardian covers that cycle's outputs.
+  [[nodiscard]] GuardianSign beat() noexcept {
     ours_.cycle_beats.store(++beats_, std::memory_order_relaxed);
     const rig::Reason taken_back_for = guard_.taken_back_for.load(std::memory_order_relaxed);
     if (silent_cycles_max_ == 0) return {taken_back_for, 0};
@@ -57,16 +77,29 @@ class Heartbeat final : public runtime::CycleWatch {
     guardian_beats_ = seen;
     return {silent_cycles_ >= silent_cycles_max_ ? rig::Reason::guardian_silent : taken_back_for, silent_cycles_};
   }
-  void keep(const rig::CycleRecord& record) noexcept override { recorder_.push(record); }
+  void keep(const rig::CycleRecord& record) noexcept { recorder_.push(record); }
 
  private:
   RunPage& ours_;
   const GuardPage& guard_;
-  runtime::FlightRing& recorder_;
+  FlightRing& recorder_;
   std::uint64_t silent_cycles_max_;
   std::uint64_t beats_{0};
   std::uint64_t guardian_beats_{0};
   std::uint64_t silent_cycles_{0};
 };
 
-}  // namespace abs_hil::guardian
+/// Supervisor of a run, such as the guardian. It must be armed before the outputs are enabled, and is told when they
+/// are safe again.
+class RunGuard : public driver::MakingSafeListener {
+ public:
+  /// Arms the supervisor; the driver is configured and inactive. Throws driver::Unavailable: the run must not start
+  /// then.
+  /// @param controller  what the cycle's thread has; a weaker supervisor is refused, because it would act too late
+  virtual void arm(const Scheduling& controller) = 0;
+  /// Tells that the driver was deactivated. The thread that deactivated it makes the call. Real-time safe.
+  /// @param safe  true if the board is known to be in the safe state
+  virtual void outputs_released(bool safe) noexcept = 0;
+};
+
+}  // namespace abs_hil::runtime

@@ -1,19 +1,25 @@
-// Messages to systemd, and a watch for the computer's sleep over its bus.
-#include "guardian/systemd.hpp"
+// What the service hears of its machine: systemd's socket, sleep over logind's bus, and pauses of a virtual machine.
+#include "guardian/machine.hpp"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <charconv>
+#include <chrono>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <string_view>
 #include <utility>
 
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/monotonic_time.hpp"
+#include "driver/sysfs.hpp"
 #include "runtime/realtime_setup.hpp"
 
 #ifdef ABS_HIL_HAVE_LIBSYSTEMD
@@ -23,6 +29,13 @@
 namespace abs_hil::guardian {
 
 namespace {
+
+using rig::ns_per_s;
+
+constexpr std::int64_t least_pause_ns = ns_per_s / 2;
+/// Longer than any pause: somebody has set the clock.
+constexpr std::int64_t longest_pause_ns = 43'200 * ns_per_s;
+constexpr std::int64_t drift_divisor = 1000;
 
 /// A socket connected to systemd's, made once. A path that begins with '@' is in the abstract namespace.
 int open_socket() noexcept {
@@ -40,24 +53,29 @@ int open_socket() noexcept {
   return -1;
 }
 
-void notify(std::string_view text) noexcept {
-  if (ServiceManager::descriptor() < 0) return;
-  static_cast<void>(::send(ServiceManager::descriptor(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
-}
-
-void signal_event(const driver::FileDescriptor& event) {
-  constexpr std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = ::write(event.get(), &one, sizeof one);
-}
-
-bool take_event(const driver::FileDescriptor& event) {
-  std::uint64_t count = 0;
-  return ::read(event.get(), &count, sizeof count) == sizeof count;
-}
-
-driver::FileDescriptor new_event() { return driver::FileDescriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
-
 }  // namespace
+
+int systemd_socket() noexcept {
+  static const int fd = open_socket();
+  return fd;
+}
+
+void tell_systemd(std::string_view message) noexcept {
+  if (systemd_socket() < 0) return;
+  static_cast<void>(::send(systemd_socket(), message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
+}
+
+Event::Event() : file_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+
+void Event::signal() const noexcept {
+  constexpr std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = ::write(file_.get(), &one, sizeof one);
+}
+
+bool Event::take() const noexcept {
+  std::uint64_t count = 0;
+  return ::read(file_.get(), &count, sizeof count) == sizeof count;
+}
 
 #ifdef ABS_HIL_HAVE_LIBSYSTEMD
 
@@ -115,7 +133,7 @@ class SleepWatch::Logind {
     if (::sd_bus_message_read(message, "b", &going) < 0) return 0;
     logind_watch.watch_.going_to_sleep_ = going != 0;
     if (going == 0) static_cast<void>(logind_watch.inhibit());
-    signal_event(logind_watch.watch_.happened_);
+    logind_watch.watch_.happened_.signal();
     return 0;
   }
 
@@ -135,9 +153,9 @@ void SleepWatch::watch(const std::stop_token& stop) {
   tell_("logind delays a suspension until the outputs are safe");
   constexpr int look_ms = 500;
   while (!stop.stop_requested() && bus.process()) {
-    std::array<pollfd, 2> files{pollfd{bus.descriptor(), bus.events(), 0}, pollfd{dealt_with_.get(), POLLIN, 0}};
+    std::array<pollfd, 2> files{pollfd{bus.descriptor(), bus.events(), 0}, pollfd{dealt_with_.descriptor(), POLLIN, 0}};
     static_cast<void>(::poll(files.data(), files.size(), look_ms));
-    if (take_event(dealt_with_)) bus.let_sleep();
+    if (dealt_with_.take()) bus.let_sleep();
   }
   if (!stop.stop_requested()) tell_("lost logind: a suspension is noticed only after it");
 }
@@ -150,41 +168,75 @@ void SleepWatch::watch(const std::stop_token& /*stop*/) {
 
 #endif
 
-SleepWatch::SleepWatch(std::function<void(const std::string&)> tell)
-    : tell_(std::move(tell)), happened_(new_event()), dealt_with_(new_event()) {
+SleepWatch::SleepWatch(std::function<void(const std::string&)> tell) : tell_(std::move(tell)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
-SleepWatch::~SleepWatch() = default;
-
 Interruption SleepWatch::interruption() {
-  return {.descriptor = happened_.get(),
+  return {.descriptor = happened_.descriptor(),
           .take =
               [this] {
-                static_cast<void>(take_event(happened_));
+                happened_.take();
                 return going_to_sleep_ ? rig::Reason::computer_will_suspend : rig::Reason::none;
               },
           .bars_leases =
               [this] { return going_to_sleep_ ? std::string("the computer is about to be suspended") : std::string(); },
           .dealt_with =
-              [this](bool) {
-                if (going_to_sleep_) signal_event(dealt_with_);
+              [this] {
+                if (going_to_sleep_) dealt_with_.signal();
               }};
 }
 
-int ServiceManager::descriptor() noexcept {
-  static const int fd = open_socket();
-  return fd;
+bool ClockLead::leapt(std::int64_t clock_s, std::int64_t monotonic_ns) noexcept {
+  const std::int64_t least_ns = clock_s * ns_per_s - monotonic_ns;
+  const std::int64_t most_ns = least_ns + ns_per_s;
+  const std::int64_t ahead_ns = least_ns - most_ns_;
+  const std::int64_t drift_ns = (monotonic_ns - looked_ns_) / drift_divisor;
+  looked_ns_ = monotonic_ns;
+  if (first_ || ahead_ns > least_pause_ns) {
+    most_ns_ = most_ns;
+    return !std::exchange(first_, false) && ahead_ns < longest_pause_ns;
+  }
+  most_ns_ = std::min(most_ns, most_ns_ + drift_ns);
+  return false;
 }
 
-void ServiceManager::ready() noexcept { notify("READY=1"); }
+MachinePause::MachinePause(std::function<void()> found) : found_(std::move(found)) {
+  if (driver::value_in("/proc/cpuinfo", "flags").find(" hypervisor") == std::string::npos) return;
+  // Not /dev/rtc0: only one process may have that open.
+  clock_ = driver::FileDescriptor(::open("/sys/class/rtc/rtc0/since_epoch", O_RDONLY | O_CLOEXEC));
+  if (!works()) return;
+  thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
+}
 
-void ServiceManager::alive() noexcept { notify("WATCHDOG=1"); }
+std::int64_t MachinePause::clock_s() const {
+  std::array<char, 32> text{};
+  const ssize_t size = ::pread(clock_.get(), text.data(), text.size(), 0);
+  std::int64_t seconds = -1;
+  if (size > 0) std::from_chars(text.data(), text.data() + size, seconds);
+  return seconds;
+}
 
-void ServiceManager::status(const std::string& text) {
-  if (text == told_) return;
-  told_ = text;
-  notify("STATUS=" + text);
+void MachinePause::watch(const std::stop_token& stop) {
+  using std::chrono::milliseconds;
+  runtime::keep_signals_away();
+  while (!stop.stop_requested()) {
+    if (const std::int64_t now_s = clock_s(); now_s >= 0 && lead_.leapt(now_s, driver::monotonic_ns())) {
+      if (leased_) found_();
+      happened_.signal();
+    }
+    std::this_thread::sleep_for(leased_ ? milliseconds(1) : milliseconds(100));
+  }
+}
+
+Interruption MachinePause::interruption() {
+  return {.descriptor = happened_.descriptor(),
+          .take =
+              [this] {
+                happened_.take();
+                return rig::Reason::none;  // the guard knows: it need only look
+              },
+          .lease_changed = [this](bool held) { leased_ = held; }};
 }
 
 }  // namespace abs_hil::guardian

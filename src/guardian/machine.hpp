@@ -3,12 +3,53 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <string_view>
 #include <thread>
 
 #include "driver/file_descriptor.hpp"
 #include "guardian/talker.hpp"
 
 namespace abs_hil::guardian {
+
+/// The datagram socket of systemd ($NOTIFY_SOCKET, sd_notify(3)); -1 without systemd.
+[[nodiscard]] int systemd_socket() noexcept;
+/// Sends a message to systemd, such as "READY=1"; nothing without it. Never waits: a message that systemd cannot take
+/// at once is left out.
+void tell_systemd(std::string_view message) noexcept;
+
+/// Something that one thread signals and another one waits for: an eventfd.
+class Event {
+ public:
+  Event();
+  [[nodiscard]] int descriptor() const noexcept { return file_.get(); }
+  void signal() const noexcept;
+  /// True if it was signalled since the last call.
+  bool take() const noexcept;
+
+ private:
+  driver::FileDescriptor file_;
+};
+
+/// Holds logind's sleep inhibitor (mode "delay"): before the computer is suspended, the service takes the outputs back
+/// and makes them safe, and only then the inhibitor is let go. After the suspension the service looks at the board
+/// first. Works in a thread of its own; without logind it says so once and does nothing.
+class SleepWatch {
+ public:
+  /// @param tell  called in the watch's thread
+  explicit SleepWatch(std::function<void(const std::string&)> tell);
+  [[nodiscard]] Interruption interruption();
+
+ private:
+  class Logind;
+  void watch(const std::stop_token& stop);
+
+  std::function<void(const std::string&)> tell_;
+  Event happened_{};    ///< the computer will sleep, or has woken
+  Event dealt_with_{};  ///< the outputs are safe, or cannot be made safe
+  std::atomic<bool> going_to_sleep_{false};
+  std::jthread thread_{};
+};
 
 /// Compares a clock of whole seconds, which never stands, with one of nanoseconds, which stands while the machine is
 /// paused. A reading s at the time m only says that the first clock leads the second by s - m to s - m + 1 s.
@@ -36,24 +77,18 @@ class MachinePause {
   /// of the thread that constructs it.
   /// @param found  called in its thread after each pause during a lease
   explicit MachinePause(std::function<void()> found);
-  MachinePause(const MachinePause&) = delete;
-  MachinePause& operator=(const MachinePause&) = delete;
-  ~MachinePause() = default;
-
   [[nodiscard]] bool works() const noexcept { return clock_.get() >= 0; }
   /// Use it only if it works. It refers to this object.
   [[nodiscard]] Interruption interruption();
 
  private:
   void watch(const std::stop_token& stop);
-  /// True if the real-time clock has gone on while the other clocks stood still.
-  [[nodiscard]] bool paused();
   /// Seconds; < 0 if the clock cannot be read.
   [[nodiscard]] std::int64_t clock_s() const;
 
   std::function<void()> found_;
   driver::FileDescriptor clock_{-1};
-  driver::FileDescriptor happened_{-1};  ///< eventfd
+  Event happened_{};
   std::atomic<bool> leased_{false};
   ClockLead lead_{};
   std::jthread thread_{};
