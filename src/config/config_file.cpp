@@ -130,8 +130,7 @@ std::vector<FileValue> read_model(const fs::path& file) {
     const KeyTable table(defaults);
     for (const Key& key : table.keys()) {
       if (!key.name.starts_with("model.")) continue;
-      model.push_back(
-          {key.name, std::visit([](const auto* value) { return Value(*value); }, key.target), file.string()});
+      model.push_back({key.name, value_of(key), file.string()});
     }
   }
   for (FileValue& value : as_model(given)) model.push_back(std::move(value));

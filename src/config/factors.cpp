@@ -166,10 +166,6 @@ bool script_may_set(std::string_view key) noexcept {
   return std::ranges::none_of(not_for_scripts, [key](std::string_view start) { return key.starts_with(start); });
 }
 
-std::string text_of(const Value& value) {
-  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
-}
-
 double at(const Uniform& range, double u) noexcept {
   const double value =
       range.logarithmic ? range.from * std::pow(range.to / range.from, u) : std::lerp(range.from, range.to, u);

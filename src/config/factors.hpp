@@ -55,7 +55,4 @@ struct Factor {
 /// False for the keys that say who runs a script, and on what: neither settings nor factors of a script may name them.
 [[nodiscard]] bool script_may_set(std::string_view key) noexcept;
 
-/// Formats a value as --set takes it.
-[[nodiscard]] std::string text_of(const Value& value);
-
 }  // namespace abs_hil::config

@@ -4,6 +4,7 @@
 #include <functional>
 #include <initializer_list>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -39,8 +40,15 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// "model.x" for "plant.x"; null for a value that only the plant has, and for a name that is not of the plant.
 [[nodiscard]] const Key* model_key(const std::vector<Key>& keys, std::string_view name);
 
-/// The value as plain text.
-[[nodiscard]] std::string value_text(const Key& key);
+/// The value that the key has.
+[[nodiscard]] Value value_of(const Key& key);
+/// The value as a number; nothing for flags and texts.
+[[nodiscard]] std::optional<double> number_of(const Value& value);
+/// The value as --set takes it.
+[[nodiscard]] std::string text_of(const Value& value);
+/// The value as JSON and as TOML hold it.
+[[nodiscard]] nlohmann::ordered_json json_of(const Value& value);
+[[nodiscard]] std::string toml_of(const Value& value);
 
 /// How the key bears on the safety of a run on a board: as its row says, otherwise as its table. Unclassed in
 /// `driver.`, `gate.`, `guardian.`, `realtime.` and `experiment.`, whose rows must say it.

@@ -284,7 +284,7 @@ Configuration configuration_of(Settings settings) {
   const bool differs = !s.model_name.empty() || s.model != s.plant.rig;
   for (const Key& key : keys.keys()) {
     if (!differs || !key.name.starts_with("model.")) continue;
-    std::visit([&](const auto* value) { keys.set(key.name, *value, "model"); }, key.target);
+    keys.set(key.name, value_of(key), "model");
   }
   write_texts(made, keys);
   return made;
@@ -318,9 +318,7 @@ void choose(const SeriesMember& member, Sources& sources) {
 
 nlohmann::ordered_json varied_json(const SeriesMember& member) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const auto& [key, value] : member.varied) {
-    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
-  }
+  for (const auto& [key, value] : member.varied) json[key] = json_of(value);
   return json;
 }
 

@@ -10,18 +10,6 @@ namespace {
 
 constexpr std::string_view plant_prefix = "plant.";
 
-std::string toml_of(const Key& key) {
-  return std::visit(
-      [](const auto* target) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>) {
-          return fmt::format("\"{}\"", *target);
-        } else {
-          return fmt::format("{}", *target);
-        }
-      },
-      key.target);
-}
-
 std::string facts_of(const Key& key) {
   const bool is_number =
       std::holds_alternative<double*>(key.target) || std::holds_alternative<std::int32_t*>(key.target);
@@ -38,7 +26,7 @@ std::string section(const KeyTable& keys, bool of_rig) {
     if (!key.name.starts_with(plant_prefix) || key.on_rig.empty() == of_rig) continue;
     text += '\n' + facts_of(key);
     if (of_rig) text += fmt::format("# on the rig: {}\n", key.on_rig);
-    text += fmt::format("{} = {}\n", key.name.substr(plant_prefix.size()), toml_of(key));
+    text += fmt::format("{} = {}\n", key.name.substr(plant_prefix.size()), toml_of(value_of(key)));
   }
   return text;
 }

@@ -116,7 +116,7 @@ void list_keys(bool json) {
     Json rows = Json::array();
     for (const config::Key& key : table.keys()) {
       rows.push_back({{"name", key.name},
-                      {"value", config::value_text(key)},
+                      {"value", config::text_of(config::value_of(key))},
                       {"valid", valid_of(key)},
                       {"unit", key.unit},
                       {"meaning", key.meaning},
@@ -127,11 +127,11 @@ void list_keys(bool json) {
   }
   for (const config::Key& key : table.keys()) {
     name_width = std::max(name_width, key.name.size());
-    value_width = std::max(value_width, config::value_text(key).size());
+    value_width = std::max(value_width, config::text_of(config::value_of(key)).size());
   }
   for (const config::Key& key : table.keys()) {
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, config::value_text(key), value_width,
-               valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning,
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, config::text_of(config::value_of(key)),
+               value_width, valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning,
                config::safety_of(key).kind != rig::SafetyClass::Kind::none ? fmt::format(" [{}]", class_of(key)) : "");
   }
 }
