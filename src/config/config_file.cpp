@@ -3,7 +3,6 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,6 +11,7 @@
 #include <fstream>
 
 #include "config/config_error.hpp"
+#include "config/reader.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 
@@ -43,27 +43,21 @@ bool is_table(const std::string& name) {
   return std::ranges::any_of(keys.keys(), [&](const Key& key) { return key.name.starts_with(name + '.'); });
 }
 
-void collect(const toml::table& table, const std::string& prefix, const fs::path& file,
-             std::vector<FileValue>& values) {
-  for (const auto& [key, node] : table) {
-    const std::string name = prefix.empty() ? std::string(key.str()) : prefix + '.' + std::string(key.str());
+std::vector<FileValue> values_of(const toml::table& table, const fs::path& file) {
+  std::vector<FileValue> values;
+  const auto is_empty = [](const toml::table& inner) { return inner.empty(); };
+  for_each_value(table, {}, is_empty, [&](const std::string& name, Place, const toml::node& node) {
     const std::string origin = fmt::format("{}:{}", file.string(), node.source().begin.line);
-    if (const auto* inner = node.as_table()) {
-      collect(*inner, name, file, values);
+    if (node.is_table()) {
       // An empty table sets nothing, so that no key's check would notice a misspelled name.
-      if (inner->empty() && !is_table(name)) values.push_back({name, std::string(), origin});
-    } else if (const auto* text = node.as_string()) {
-      values.push_back({name, text->get(), origin});
-    } else if (const auto* flag = node.as_boolean()) {
-      values.push_back({name, flag->get(), origin});
-    } else if (const auto* integer = node.as_integer()) {
-      values.push_back({name, integer->get(), origin});
-    } else if (const auto* real = node.as_floating_point()) {
-      values.push_back({name, real->get(), origin});
+      if (!is_table(name)) values.push_back({name, std::string(), origin});
+    } else if (const std::optional<Value> value = value_in(node)) {
+      values.push_back({name, *value, origin});
     } else {
       throw ConfigError(fmt::format("{}: {} is neither a number, a flag nor a text; give one of them", origin, name));
     }
-  }
+  });
+  return values;
 }
 
 bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
@@ -111,9 +105,7 @@ std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
                                     file.string(), node.source().begin.line, std::string_view(key.str())));
     }
   }
-  std::vector<FileValue> values;
-  collect(table, {}, file, values);
-  return values;
+  return values_of(table, file);
 }
 
 void set_all(const std::vector<FileValue>& values, KeyTable& keys) {

@@ -164,7 +164,21 @@ void TableReader::read(const Entry& entry, Member& member) const {
 /// @param unit_is_named true if the key's name gives the unit
 [[nodiscard]] Number read_number(const Source& source, const toml::node& node, const rig::OptionFacts& facts,
                                  std::string_view what, bool unit_is_named);
-/// A configuration value as TOML holds it.
-[[nodiscard]] Value read_value(const Source& source, std::string_view key, const toml::node& node);
+/// A configuration value as TOML holds it; nothing for what is none.
+[[nodiscard]] std::optional<Value> value_in(const toml::node& node);
+/// Calls `visit(dotted name, place of the name, node)` for each value below a table of configuration keys. A table
+/// for which `is_value` is true is a value.
+template <class IsValue, class Visit>
+void for_each_value(const toml::table& table, const std::string& prefix, const IsValue& is_value, const Visit& visit) {
+  for (const auto& [name, node] : table) {
+    const std::string key = prefix + (prefix.empty() ? "" : ".") + std::string(name.str());
+    const auto* inner = node.as_table();
+    if (inner != nullptr && !is_value(*inner)) {
+      for_each_value(*inner, key, is_value, visit);
+    } else {
+      visit(key, place_of(name.source()), node);
+    }
+  }
+}
 
 }  // namespace abs_hil::config
