@@ -141,6 +141,8 @@ fs::path first_folder(const std::vector<fs::path>& places) {
                                 places.back().string()));
 }
 
+fs::path plants_dir() { return config_dir() / "plants"; }
+
 fs::path& given_own_config_dir() {
   static fs::path folder;
   return folder;
@@ -166,17 +168,29 @@ fs::path config_dir() {
   return given != nullptr ? first_folder({given}) : own_config_dir();
 }
 
-fs::path plant_file(std::string_view name_or_file, std::string_view option) {
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+fs::path named_file(fs::path (*folder)(), std::string_view what, std::string_view name_or_file,
+                    std::string_view option) {
   fs::path given(name_or_file);
   if (given.has_parent_path() || given.extension() == ".toml") return given;
-  fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
+  fs::path named = folder() / fmt::format("{}.toml", name_or_file);
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
-  std::vector<std::string_view> names;
-  const std::vector<PlantEntry> known = known_plants();
-  names.reserve(known.size());
-  for (const PlantEntry& plant : known) names.push_back(plant.name);
-  throw ConfigError(fmt::format("{}: unknown plant \"{}\"{}; known: {}; or give a TOML file", option, name_or_file,
-                                rig::nearest_hint(name_or_file, names), fmt::join(names, ", ")));
+  const std::vector<std::string> known = names_in(folder());
+  throw ConfigError(fmt::format("{}: {} \"{}\"{}; known: {}; or give a TOML file", option, what, name_or_file,
+                                rig::nearest_hint(name_or_file, known), fmt::join(known, ", ")));
+}
+
+fs::path plant_file(std::string_view name_or_file, std::string_view option) {
+  return named_file(&plants_dir, "unknown plant", name_or_file, option);
 }
 
 std::string model_origin(const Settings& settings, std::chrono::sys_days today) {
@@ -192,11 +206,9 @@ std::string model_origin(const Settings& settings, std::chrono::sys_days today) 
 
 std::vector<PlantEntry> known_plants() {
   std::vector<PlantEntry> plants;
-  for (const auto& entry : fs::directory_iterator(config_dir() / "plants")) {
-    if (entry.path().extension() != ".toml") continue;
-    plants.push_back({entry.path().stem().string(), parse(entry.path())["description"].value_or(std::string())});
+  for (const std::string& name : names_in(plants_dir())) {
+    plants.push_back({name, parse(plant_file(name))["description"].value_or(std::string())});
   }
-  std::sort(plants.begin(), plants.end(), [](const PlantEntry& a, const PlantEntry& b) { return a.name < b.name; });
   return plants;
 }
 

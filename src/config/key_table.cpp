@@ -1,4 +1,4 @@
-// Values of the configuration by their dotted names: setting with checks, printing as TOML and JSON.
+// Values of the configuration by their dotted names: setting with checks, printing as TOML, to and from JSON.
 #include "config/key_table.hpp"
 
 #include <fmt/format.h>
@@ -15,6 +15,7 @@
 #include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
+#include "rig/parse_json.hpp"
 
 namespace abs_hil::config {
 
@@ -267,6 +268,50 @@ nlohmann::ordered_json KeyTable::to_json() const {
     (*node)[std::string(rest)] = json_of(value_of(key));
   }
   return root;
+}
+
+namespace {
+
+void set_values(const nlohmann::ordered_json& node, const std::string& name, KeyTable& table, std::string_view origin,
+                std::vector<std::string>& unknown) {
+  if (node.is_object()) {
+    for (const auto& [key, value] : node.items()) {
+      set_values(value, name.empty() ? key : fmt::format("{}.{}", name, key), table, origin, unknown);
+    }
+    return;
+  }
+  if (find_key(table.keys(), name) == nullptr) {
+    unknown.push_back(name);
+  } else if (node.is_boolean()) {
+    table.set(name, node.get<bool>(), origin);
+  } else if (node.is_number_integer()) {
+    table.set(name, node.get<std::int64_t>(), origin);
+  } else if (node.is_number()) {
+    table.set(name, node.get<double>(), origin);
+  } else if (node.is_string()) {
+    table.set(name, node.get<std::string>(), origin);
+  } else {
+    throw ConfigError(std::string(origin) + ": " + name + " is neither a number, a flag nor a text; give one of them");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTable& table, std::string_view origin) {
+  if (!config.is_object())
+    throw ConfigError(std::string(origin) + ": the configuration is not a JSON object; give one");
+  std::vector<std::string> unknown;
+  set_values(config, {}, table, origin, unknown);
+  return unknown;
+}
+
+void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
+                 std::string_view origin) try {
+  const auto config = rig::parse_json<nlohmann::ordered_json>(text);
+  std::vector<std::string> unknown;
+  for (const char* table : tables) set_values(config.at(table), table, keys, origin, unknown);
+} catch (const nlohmann::json::exception& error) {
+  throw ConfigError(std::string(origin) + ": " + error.what());
 }
 
 }  // namespace abs_hil::config

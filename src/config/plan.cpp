@@ -10,7 +10,6 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "config/config_error.hpp"
-#include "config/library.hpp"
 
 namespace abs_hil::config {
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -297,5 +298,11 @@ using FileReader = std::function<std::optional<std::string>(const std::string& n
 
 /// The script of that file. Throws ConfigError.
 [[nodiscard]] Script load(const std::string& path);
+
+/// The experiment of that name, a file in config_dir()/experiments, or the file itself if it is a path or ends in
+/// .toml. The process reads each file once. Throws ConfigError, naming the known ones. Thread-safe.
+[[nodiscard]] std::shared_ptr<const Script> find(const std::string& name_or_file);
+/// The experiments in config_dir()/experiments, by name.
+[[nodiscard]] std::vector<std::shared_ptr<const Script>> known_experiments();
 
 }  // namespace abs_hil::config

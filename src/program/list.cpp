@@ -14,7 +14,7 @@
 #include "abs_hil/rig/reason.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "driver/factory.hpp"
 #include "program/subcommands.hpp"
 

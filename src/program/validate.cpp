@@ -8,7 +8,6 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "config/explain.hpp"
-#include "config/library.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "program/subcommands.hpp"

@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "driver/factory.hpp"
 #include "driver/injection/injecting_driver.hpp"
 #include "driver/injection/injection.hpp"

@@ -6,7 +6,6 @@
 
 #include "catch.hpp"
 #include "config/explain.hpp"
-#include "config/library.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::config;
