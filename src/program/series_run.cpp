@@ -19,7 +19,6 @@
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
-#include "program/questions.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/clean_text.hpp"
