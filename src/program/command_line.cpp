@@ -78,82 +78,59 @@ RunRequest merge(const RunOptions& options) {
 }
 
 void add_backend_option(cli::Parser& parser, config::Sources& o) {
-  parser.add(
-      {.names = "--backend", .to = &o.backend, .help = "sim or rig", .one_of = {"sim", "rig"}, .show_default = true});
+  parser.add("--backend", &o.backend, "sim or rig", {.one_of = {"sim", "rig"}, .show_default = true});
 }
 
 void add_config_file(cli::Parser& parser, config::Sources& o) {
-  parser.add(
-      {.names = "--config", .to = &o.config_file, .help = "TOML file with any configuration values", .type = "FILE"});
+  parser.add("--config", &o.config_file, "TOML file with any configuration values", {.type = "FILE"});
 }
 
 void add_assignments(cli::Parser& parser, config::Sources& o) {
-  parser.add({.names = "--set",
-              .to = &o.assignments,
-              .help = "set any configuration value (abs_hil list --keys)",
-              .type = "key=value",
-              .repeated = true});
+  parser.add("--set", &o.assignments, "set any configuration value (abs_hil list --keys)",
+             {.type = "key=value", .repeated = true});
 }
 
 void add_configuration_options(cli::Parser& parser, config::Sources& o) {
   add_config_file(parser, o);
-  parser.add({.names = "--plant", .to = &o.plant, .help = "simulated plant by name or TOML file", .type = "NAME|FILE"});
-  parser.add({.names = "--model",
-              .to = &o.model,
-              .help = "the controllers' model of the rig, by name or TOML file (default: the plant)",
-              .type = "NAME|FILE"});
-  parser.add({.names = "--controller,--controllers",
-              .to = &o.controller,
-              .help = "slip controller, by name or FILE.so, FILE.fmu or FILE.agent",
-              .type = "NAME|FILE"});
+  parser.add("--plant", &o.plant, "simulated plant by name or TOML file", {.type = "NAME|FILE"});
+  parser.add("--model", &o.model, "the controllers' model of the rig, by name or TOML file (default: the plant)",
+             {.type = "NAME|FILE"});
+  parser.add("--controller,--controllers", &o.controller, "slip controller, by name or FILE.so, FILE.fmu or FILE.agent",
+             {.type = "NAME|FILE"});
   add_assignments(parser, o);
 }
 
 void add_threads(cli::Parser& parser, std::size_t& threads) {
-  parser.add({.names = "--threads",
-              .to = &threads,
-              .help = "number of threads, 0: one for each processor; does not change the results",
-              .type = "N",
-              .range = {0, 1024},
-              .show_default = true});
+  parser.add("--threads", &threads, "number of threads, 0: one for each processor; does not change the results",
+             {.type = "N", .range = {0, 1024}, .show_default = true});
 }
 
 void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<std::string>& histogram_file) {
-  parser.add({.names = "--rate", .to = &o.rate_Hz, .help = "control cycles per second, 100 to 10000", .type = "HZ"});
-  parser.add({.names = "--rt",
-              .to = &o.realtime,
-              .help = "real-time scheduling: required, preferred or off (default: require on a real board, otherwise "
-                      "prefer)",
-              .one_of = {"require", "prefer", "off"}});
-  parser.add({.names = "--histogram",
-              .to = &histogram_file,
-              .help = "write latency histograms in cyclictest's format",
-              .type = "FILE"});
+  parser.add("--rate", &o.rate_Hz, "control cycles per second, 100 to 10000", {.type = "HZ"});
+  parser.add("--rt", &o.realtime,
+             "real-time scheduling: required, preferred or off (default: require on a real board, otherwise "
+             "prefer)",
+             {.one_of = {"require", "prefer", "off"}});
+  parser.add("--histogram", &histogram_file, "write latency histograms in cyclictest's format", {.type = "FILE"});
 }
 
 namespace {
 
 void add_output_options(cli::Parser& parser, OutputOptions& o) {
-  parser.add({.names = "--csv", .to = &o.csv_file, .help = "write every cycle to a CSV file", .type = "FILE"});
-  parser.add({.names = "--log", .to = &o.log_file, .help = "write an LCM event log (.lcmlog)", .type = "FILE"});
-  parser.add({.names = "--summary", .to = &o.summary_file, .help = "write the summary as JSON", .type = "FILE"});
-  parser.add({.names = "--prior",
-              .to = &o.prior_file,
-              .help = "what the controller learns for the next braking on this rig: read if the file is there, renewed "
-                      "after each braking that stops",
-              .type = "FILE"});
-  parser.add({.names = "--recorder",
-              .to = &o.recorder_dir,
-              .help = "folder for the flight record: the last 2 s of a run that ended by a fault",
-              .type = "DIR"});
-  parser.add({.names = "--out",
-              .to = &o.run_folder,
-              .help = "run folder for all of the run's files, new or empty (default: a new one below runs/)",
-              .type = "DIR"});
-  parser.add({.names = "--no-out", .to = &o.no_run_folder, .help = "write no run folder", .excludes = {"--out"}});
-  parser.add(
-      {.names = "--lcm-url", .to = &o.lcm_url, .help = "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)"});
-  parser.add({.names = "--no-lcm", .to = &o.no_lcm, .help = "do not publish on LCM", .excludes = {"--lcm-url"}});
+  parser.add("--csv", &o.csv_file, "write every cycle to a CSV file", {.type = "FILE"});
+  parser.add("--log", &o.log_file, "write an LCM event log (.lcmlog)", {.type = "FILE"});
+  parser.add("--summary", &o.summary_file, "write the summary as JSON", {.type = "FILE"});
+  parser.add("--prior", &o.prior_file,
+             "what the controller learns for the next braking on this rig: read if the file is there, renewed "
+             "after each braking that stops",
+             {.type = "FILE"});
+  parser.add("--recorder", &o.recorder_dir, "folder for the flight record: the last 2 s of a run that ended by a fault",
+             {.type = "DIR"});
+  parser.add("--out", &o.run_folder,
+             "run folder for all of the run's files, new or empty (default: a new one below runs/)", {.type = "DIR"});
+  parser.add("--no-out", &o.no_run_folder, "write no run folder", {.excludes = {"--out"}});
+  parser.add("--lcm-url", &o.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
+  parser.add("--no-lcm", &o.no_lcm, "do not publish on LCM", {.excludes = {"--lcm-url"}});
 }
 
 }  // namespace
@@ -161,21 +138,17 @@ void add_output_options(cli::Parser& parser, OutputOptions& o) {
 void add_run_options(cli::Parser& parser, RunOptions& o) {
   add_backend_option(parser, o);
   add_configuration_options(parser, o);
-  parser.add(
-      {.names = "--experiment", .to = &o.experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});
-  parser.add({.names = "--slip-ref", .to = &o.slip_ref, .help = "slip reference, in (0, 1)", .type = "X"});
+  parser.add("--experiment", &o.experiment, "experiment by name or TOML file", {.type = "NAME|FILE"});
+  parser.add("--slip-ref", &o.slip_ref, "slip reference, in (0, 1)", {.type = "X"});
   add_timing_options(parser, o, o.outputs.histogram_file);
-  parser.add({.names = "--wait-for-start",
-              .to = &o.wait_for_start,
-              .help = "wait for `abs_hil send start` before the first phase (needs commands.enabled)"});
-  parser.add({.names = "--fast", .to = &o.virtual_time, .help = "run in virtual time, as fast as the computer can"});
-  parser.add({.names = "--seed", .to = &o.seed, .help = "seed of all random numbers in the simulator", .type = "N"});
-  parser.add({.names = "--inject",
-              .to = &o.injections,
-              .help = "inject a fault, given as PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION], for example "
-                      "brake@encoder_upper:stuck+0.2s; simulator and emulators only",
-              .type = "FAULT",
-              .repeated = true});
+  parser.add("--wait-for-start", &o.wait_for_start,
+             "wait for `abs_hil send start` before the first phase (needs commands.enabled)");
+  parser.add("--fast", &o.virtual_time, "run in virtual time, as fast as the computer can");
+  parser.add("--seed", &o.seed, "seed of all random numbers in the simulator", {.type = "N"});
+  parser.add("--inject", &o.injections,
+             "inject a fault, given as PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION], for example "
+             "brake@encoder_upper:stuck+0.2s; simulator and emulators only",
+             {.type = "FAULT", .repeated = true});
   add_output_options(parser, o.outputs);
 }
 

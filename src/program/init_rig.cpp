@@ -43,11 +43,8 @@ int init_rig(const config::Settings& settings, const std::string& name) {
 Action add_init_rig(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<config::Sources>();
   const auto name = std::make_shared<std::string>();
-  parser.add({.names = "name", .to = name.get(), .help = "name of the rig", .type = "NAME", .required = true});
-  parser.add({.names = "--plant",
-              .to = &o->plant,
-              .help = "plant whose values it begins with, by name or TOML file",
-              .type = "NAME|FILE"});
+  parser.add("name", name.get(), "name of the rig", {.type = "NAME", .required = true});
+  parser.add("--plant", &o->plant, "plant whose values it begins with, by name or TOML file", {.type = "NAME|FILE"});
   return [o, name] { return init_rig(config::merged_settings(*o), *name); };
 }
 

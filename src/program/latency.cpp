@@ -140,17 +140,11 @@ Action add_latency(cli::Parser& parser, const Words&) {
   add_backend_option(parser, o->sources);
   add_configuration_options(parser, o->sources);
   add_timing_options(parser, o->sources, o->histogram_file);
-  parser.add({.names = "--duration",
-              .to = &o->duration_s,
-              .help = "duration of the test, s",
-              .type = "S",
-              .show_default = true});
-  parser.add({.names = "--secaligned",
-              .to = &o->second_offset_us,
-              .help = "begin at a whole second plus this many us, like cyclictest's option of the same name",
-              .type = "US",
-              .range = {0, 999'999}});
-  parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
+  parser.add("--duration", &o->duration_s, "duration of the test, s", {.type = "S", .show_default = true});
+  parser.add("--secaligned", &o->second_offset_us,
+             "begin at a whole second plus this many us, like cyclictest's option of the same name",
+             {.type = "US", .range = {0, 999'999}});
+  parser.add("--json", &o->json, "print JSON instead of text");
   return [o] { return latency(*o); };
 }
 

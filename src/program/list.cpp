@@ -186,17 +186,12 @@ struct ListOptions {
 
 Action add_list(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ListOptions>();
-  parser.add(
-      {.names = "--keys", .to = &o->keys, .help = "list all configuration values with unit, range and safety class"});
-  parser.add({.names = "--quantities",
-              .to = &o->quantities,
-              .help = "list the quantities of a CSV row and of ABS_TELEMETRY",
-              .excludes = {"--keys"}});
-  parser.add({.names = "--reasons",
-              .to = &o->reasons,
-              .help = "list the reasons of phase changes, ends of runs and refused commands",
-              .excludes = {"--keys", "--quantities"}});
-  parser.add({.names = "--json", .to = &o->json, .help = "print keys, quantities or reasons as JSON"});
+  parser.add("--keys", &o->keys, "list all configuration values with unit, range and safety class");
+  parser.add("--quantities", &o->quantities, "list the quantities of a CSV row and of ABS_TELEMETRY",
+             {.excludes = {"--keys"}});
+  parser.add("--reasons", &o->reasons, "list the reasons of phase changes, ends of runs and refused commands",
+             {.excludes = {"--keys", "--quantities"}});
+  parser.add("--json", &o->json, "print keys, quantities or reasons as JSON");
   return [o, parser] {
     if (o->json && !o->quantities && !o->reasons && !o->keys) {
       return parser.refuse("--json requires --keys, --quantities or --reasons");

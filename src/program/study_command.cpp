@@ -24,53 +24,31 @@ namespace {
 
 void add_submit(cli::Parser& study, StudyCommand& command) {
   command.submit = study.add_subcommand("submit", "compute a study on a Slurm cluster: an array job, then a merge");
-  command.submit.add(
-      {.names = "file", .to = &command.submitted, .help = "the study", .type = "FILE", .required = true});
-  command.submit.add({.names = "--array",
-                      .to = &command.array,
-                      .help = "tasks of the array job",
-                      .type = "N",
-                      .range = {1, 1'000'000},
-                      .required = true});
-  command.submit.add({.names = "--out",
-                      .to = &command.submitted_folder,
-                      .help = "folder of the study, on a file system that all nodes share",
-                      .type = "DIR"});
-  command.submit.add(
-      {.names = "--write-only", .to = &command.write_only, .help = "write the scripts, and do not call sbatch"});
-  command.submit.add({.names = "options",
-                      .to = &command.sbatch,
-                      .help = "options of sbatch for both jobs, after --",
-                      .type = "OPTION"});
+  command.submit.add("file", &command.submitted, "the study", {.type = "FILE", .required = true});
+  command.submit.add("--array", &command.array, "tasks of the array job",
+                     {.type = "N", .range = {1, 1'000'000}, .required = true});
+  command.submit.add("--out", &command.submitted_folder, "folder of the study, on a file system that all nodes share",
+                     {.type = "DIR"});
+  command.submit.add("--write-only", &command.write_only, "write the scripts, and do not call sbatch");
+  command.submit.add("options", &command.sbatch, "options of sbatch for both jobs, after --", {.type = "OPTION"});
 }
 
 void add_options(StudyCommand& command) {
-  command.parser.add({.names = "file", .to = &command.file, .help = "the study (docs/studies.md)", .type = "FILE"});
-  command.parser.add({.names = "--out",
-                      .to = &command.folder,
-                      .help = "folder of the results (default: one of the study's name below runs/); with --run that "
-                              "of the run",
-                      .type = "DIR"});
+  command.parser.add("file", &command.file, "the study (docs/studies.md)", {.type = "FILE"});
+  command.parser.add("--out", &command.folder,
+                     "folder of the results (default: one of the study's name below runs/); with --run that "
+                     "of the run",
+                     {.type = "DIR"});
   add_threads(command.parser, command.threads);
-  command.parser.add({.names = "--shard",
-                      .to = &command.shard,
-                      .help = "compute the I-th of N parts only; `merge` puts the parts together",
-                      .type = "I/N"});
-  command.parser.add({.names = "--run",
-                      .to = &command.run,
-                      .help = "repeat one run with everything recorded in a run folder",
-                      .type = "K",
-                      .range = {0, 2'000'000'000},
-                      .excludes = {"--shard"}});
+  command.parser.add("--shard", &command.shard, "compute the I-th of N parts only; `merge` puts the parts together",
+                     {.type = "I/N"});
+  command.parser.add("--run", &command.run, "repeat one run with everything recorded in a run folder",
+                     {.type = "K", .range = {0, 2'000'000'000}, .excludes = {"--shard"}});
   command.merge = command.parser.add_subcommand("merge", "put the parts of a study together");
-  command.merge.add({.names = "folder",
-                     .to = &command.merged,
-                     .help = "folders with parts; the results go into the first",
-                     .type = "DIR",
-                     .required = true});
+  command.merge.add("folder", &command.merged, "folders with parts; the results go into the first",
+                    {.type = "DIR", .required = true});
   command.status = command.parser.add_subcommand("status", "how much of a study is done");
-  command.status.add(
-      {.names = "folder", .to = &command.looked_at, .help = "folder of a study", .type = "DIR", .required = true});
+  command.status.add("folder", &command.looked_at, "folder of a study", {.type = "DIR", .required = true});
   add_submit(command.parser, command);
 }
 

@@ -55,9 +55,8 @@ int validate(const config::Sources& sources) {
 Action add_validate(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<config::Sources>();
   const auto schema = std::make_shared<bool>(false);
-  parser.add(
-      {.names = "EXPERIMENT", .to = &o->experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});
-  parser.add({.names = "--schema", .to = schema.get(), .help = "print the JSON Schema of experiment files instead"});
+  parser.add("EXPERIMENT", &o->experiment, "experiment by name or TOML file", {.type = "NAME|FILE"});
+  parser.add("--schema", schema.get(), "print the JSON Schema of experiment files instead");
   add_backend_option(parser, *o);
   add_configuration_options(parser, *o);
   return [o, schema] {
