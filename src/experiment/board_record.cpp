@@ -22,28 +22,19 @@ namespace fs = std::filesystem;
 
 constexpr int record_format = 1;
 
-std::string text_of(double value) { return fmt::format("{}", value); }
-std::string text_of(std::int32_t value) { return std::to_string(value); }
-std::string text_of(std::int64_t value) { return std::to_string(value); }
-std::string text_of(bool value) { return value ? "true" : "false"; }
-std::string text_of(const std::string& value) { return value; }
-
-/// The values of all options of `driver.KIND.`, as text.
-std::map<std::string, std::string> option_texts(driver::BoardOptions options, const std::string& prefix) {
+/// The values of all options, as text.
+template <class Options>
+std::map<std::string, std::string> texts_of(Options options, const std::string& prefix) {
   std::map<std::string, std::string> texts;
-  options.visit_options(prefix, [&](const std::string& name, const rig::OptionFacts&, const rig::OptionTarget& target) {
-    texts[name] = std::visit([](const auto* value) { return text_of(*value); }, target);
+  rig::for_each_option(options, prefix, [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    texts[name] = fmt::format("{}", value);
   });
   return texts;
 }
 
 /// The rig's parameters, as text. The name of their source tells nothing: its file may have changed.
 std::map<std::string, std::string> identity_texts(const RigIdentity& identity) {
-  std::map<std::string, std::string> texts;
-  rig::for_each_option(
-      identity.parameters, "rig.",
-      [&](const std::string& name, const rig::OptionFacts&, const auto& value) { texts[name] = text_of(value); });
-  return texts;
+  return texts_of(identity.parameters, "rig.");
 }
 
 bool is_cap(const std::string& name) { return name.ends_with("_duty_max"); }
@@ -130,7 +121,7 @@ BoardRecord describe_board(const driver::DriverOptions& options, const RigIdenti
   BoardRecord record{.kind = options.kind,
                      .board = board,
                      .emulated = emulated,
-                     .options = option_texts(chosen.options, prefix),
+                     .options = texts_of(chosen.options, prefix),
                      .encoder_counts_per_rev = options.encoder_counts_per_rev,
                      .identity = identity_texts(identity)};
   for (const std::string_view free : chosen.entry.free_options) record.options.erase(prefix + std::string(free));
@@ -200,15 +191,10 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
 }
 
 std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
-  driver::DriverOptions now = options;
-  driver::DriverOptions standard;
-  std::map<std::string, std::string> defaults;
-  rig::for_each_option(standard, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    defaults[name] = text_of(value);
-  });
+  auto defaults = texts_of(driver::DriverOptions{}, "driver.");
   std::string command = "abs_hil commission";
-  rig::for_each_option(now, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    const std::string text = text_of(value);
+  rig::for_each_option(options, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    const std::string text = fmt::format("{}", value);
     if (text != defaults[name]) command += " --set " + name + '=' + text;
   });
   if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
