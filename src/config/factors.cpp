@@ -162,8 +162,7 @@ double at(const Uniform& range, double u) noexcept {
   return std::clamp(value, std::min(range.from, range.to), std::max(range.from, range.to));
 }
 
-std::vector<Setting> TableReader::settings(const Entry& entry) const {
-  std::vector<Setting> settings;
+void TableReader::read(const Entry& entry, std::vector<Setting>& settings) const {
   const auto never = [](const toml::table&) { return false; };
   for_each_value(table(entry), {}, never, [&](const std::string& key, Place place, const toml::node& node) {
     static_cast<void>(source_.key(key, place));
@@ -173,11 +172,9 @@ std::vector<Setting> TableReader::settings(const Entry& entry) const {
     settings.push_back({key, read_value(source_, key, node), place_of(node.source())});
     source_.check_value(key, settings.back().value, settings.back().place);
   });
-  return settings;
 }
 
-std::vector<Factor> TableReader::factors(const Entry& entry) const {
-  std::vector<Factor> factors;
+void TableReader::read(const Entry& entry, std::vector<Factor>& factors) const {
   for_each_value(table(entry), {}, is_range, [&](const std::string& name, Place place, const toml::node& node) {
     const Key& key = source_.key(name, place);
     Factor factor{.key = name, .place = place};
@@ -193,7 +190,6 @@ std::vector<Factor> TableReader::factors(const Entry& entry) const {
   // The file's order numbers the runs. toml++ does not keep it.
   std::ranges::sort(factors, {},
                     [](const Factor& factor) { return std::pair(factor.place.line, factor.place.column); });
-  return factors;
 }
 
 }  // namespace abs_hil::config

@@ -29,11 +29,11 @@ class ProfileReader {
     if (has("from") || has("to") || has("over")) {
       const Number from = value("from", "a ramp");
       const Number to = value("to", "a ramp");
-      profile_.points = {{seconds(0.0, from.place), from}, {reader_.number(need("over", "a ramp")), to}};
+      profile_.points = {{seconds(0.0, from.place), from}, {reader_.get<Number>(need("over", "a ramp")), to}};
     } else if (has("before") || has("after") || has("at")) {
       const Number before = value("before", "a step");
       const Number after = value("after", "a step");
-      const Number at = reader_.number(need("at", "a step"));
+      const Number at = reader_.get<Number>(need("at", "a step"));
       profile_.points = {{seconds(0.0, before.place), before}, {at, before}, {at, after}};
     } else if (const Entry* points = reader_.find("points")) {
       read_points(*points);
@@ -132,7 +132,7 @@ class ProfileReader {
   }
 
   void read_file(const Entry& entry) {
-    const std::string name = reader_.text(entry);
+    const auto name = reader_.get<std::string>(entry);
     if (name.empty() || name.find('/') != std::string::npos || !name.ends_with(".csv")) {
       reader_.fail(entry.place,
                    fmt::format("file = \"{}\": name a .csv file beside the script, without a folder", name));
@@ -179,8 +179,11 @@ class ProfileReader {
 
 }  // namespace
 
-ProfileScript TableReader::profile(const Entry& entry) const {
-  if (entry.node->is_table()) return ProfileReader(*this, entry).read();
+void TableReader::read(const Entry& entry, ProfileScript& profile) const {
+  if (entry.node->is_table()) {
+    profile = ProfileReader(*this, entry).read();
+    return;
+  }
   const rig::OptionFacts& facts = entry.field->facts;
   const auto* text = entry.node->as_string();
   if (text != nullptr && !facts.allowed.empty() && !text->get().starts_with('$') &&
@@ -190,7 +193,7 @@ ProfileScript TableReader::profile(const Entry& entry) const {
                                   entry.key, shown(*entry.node), fmt::join(facts.allowed.list(), "\", \""),
                                   facts.range.text(), facts.meaning));
   }
-  return {.points = {{seconds(0.0, entry.place), number(entry)}}, .place = entry.place};
+  profile = {.points = {{seconds(0.0, entry.place), get<Number>(entry)}}, .place = entry.place};
 }
 
 }  // namespace abs_hil::config

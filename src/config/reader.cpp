@@ -184,32 +184,30 @@ bool TableReader::is_allowed_text(const Entry& entry) noexcept {
   return text != nullptr && !allowed.empty() && allowed.contains(text->get());
 }
 
-std::string TableReader::text(const Entry& entry) const {
+void TableReader::read(const Entry& entry, std::string& text) const {
   const rig::OptionFacts& facts = entry.field->facts;
-  const auto* text = entry.node->as_string();
-  if (text == nullptr || !facts.allowed.contains(text->get())) {
+  const auto* given = entry.node->as_string();
+  if (given == nullptr || !facts.allowed.contains(given->get())) {
     fail(entry.place, fmt::format("{} = {}: give {} ({})", entry.key, shown(*entry.node),
                                   facts.allowed.empty() ? "a text in quotes" : "one of " + quoted(facts.allowed.list()),
                                   facts.meaning));
   }
-  return text->get();
+  text = given->get();
 }
 
-void TableReader::flag(const Entry& entry) const {
-  const auto* flag = entry.node->as_boolean();
-  if (flag == nullptr || !flag->get()) {
-    fail(entry.place, fmt::format("{} = {}: write true", entry.key, shown(*entry.node)));
-  }
+void TableReader::read(const Entry& entry, bool& flag) const {
+  flag = entry.node->value_exact<bool>().value_or(false);
+  if (!flag) fail(entry.place, fmt::format("{} = {}: write true", entry.key, shown(*entry.node)));
 }
 
-Number TableReader::number(const Entry& entry) const {
-  return read_number(source_, *entry.node, entry.field->facts, entry.key, entry.has_suffix);
+void TableReader::read(const Entry& entry, Number& number) const {
+  number = read_number(source_, *entry.node, entry.field->facts, entry.key, entry.has_suffix);
 }
 
-double TableReader::plain_number(const Entry& entry) const {
-  const Number number = this->number(entry);
-  if (!number.key.empty()) fail(number.place, fmt::format("{}: give a number, not a $key", entry.key));
-  return number.value;
+void TableReader::read(const Entry& entry, double& number) const {
+  const auto given = get<Number>(entry);
+  if (!given.key.empty()) fail(given.place, fmt::format("{}: give a number, not a $key", entry.key));
+  number = given.value;
 }
 
 std::int64_t TableReader::whole(const Entry& entry) const {
@@ -222,17 +220,17 @@ std::int64_t TableReader::whole(const Entry& entry) const {
   return *number;
 }
 
-std::vector<std::string> TableReader::texts(const Entry& entry) const {
-  return elements<std::string>(*this, entry, "texts", "texts in quotes", [](const toml::node& node) {
+void TableReader::read(const Entry& entry, std::vector<std::string>& texts) const {
+  texts = elements<std::string>(*this, entry, "texts", "texts in quotes", [](const toml::node& node) {
     const auto* text = node.as_string();
     return text == nullptr || text->get().empty() ? std::nullopt : std::optional(text->get());
   });
 }
 
-std::vector<std::int64_t> TableReader::wholes(const Entry& entry) const {
+void TableReader::read(const Entry& entry, std::vector<std::int64_t>& wholes) const {
   const rig::Range& range = entry.field->facts.range;
-  return elements<std::int64_t>(*this, entry, "whole numbers, [1, 2, 3]", "whole numbers in " + range.text(),
-                                [&range](const toml::node& node) { return whole_in(node, range); });
+  wholes = elements<std::int64_t>(*this, entry, "whole numbers, [1, 2, 3]", "whole numbers in " + range.text(),
+                                  [&range](const toml::node& node) { return whole_in(node, range); });
 }
 
 const toml::table& TableReader::table(const Entry& entry) const {
