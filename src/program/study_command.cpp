@@ -24,10 +24,10 @@ namespace {
 
 void add_submit(cli::Parser& study, StudyCommand& command) {
   command.submit = study.add_subcommand("submit", "compute a study on a Slurm cluster: an array job, then a merge");
-  command.submit.add("file", &command.submitted, "the study", {.type = "FILE", .required = true});
+  command.submit.add("file", &command.file, "the study", {.type = "FILE", .required = true});
   command.submit.add("--array", &command.array, "tasks of the array job",
                      {.type = "N", .range = {1, 1'000'000}, .required = true});
-  command.submit.add("--out", &command.submitted_folder, "folder of the study, on a file system that all nodes share",
+  command.submit.add("--out", &command.folder, "folder of the study, on a file system that all nodes share",
                      {.type = "DIR"});
   command.submit.add("--write-only", &command.write_only, "write the scripts, and do not call sbatch");
   command.submit.add("options", &command.sbatch, "options of sbatch for both jobs, after --", {.type = "OPTION"});
@@ -48,7 +48,7 @@ void add_options(StudyCommand& command) {
   command.merge.add("folder", &command.merged, "folders with parts; the results go into the first",
                     {.type = "DIR", .required = true});
   command.status = command.parser.add_subcommand("status", "how much of a study is done");
-  command.status.add("folder", &command.looked_at, "folder of a study", {.type = "DIR", .required = true});
+  command.status.add("folder", &command.folder, "folder of a study", {.type = "DIR", .required = true});
   add_submit(command.parser, command);
 }
 
@@ -183,7 +183,7 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
                                           command.parser.given().front()));
   }
   if (command.merge.parsed()) return merge_study(command.merged);
-  if (command.status.parsed()) return show_status(command.looked_at);
+  if (command.status.parsed()) return show_status(*command.folder);
   if (command.submit.parsed()) return submit_study(command);
   if (command.file.empty()) {
     throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");

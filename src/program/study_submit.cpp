@@ -102,8 +102,8 @@ std::string plain(std::string name) {
 
 int submit_study(const StudyCommand& command) {
   check_options(command.sbatch);
-  const fs::path file = fs::absolute(command.submitted);
-  const fs::path path = fs::absolute(study_folder(command.submitted, command.submitted_folder));
+  const fs::path file = fs::absolute(command.file);
+  const fs::path path = fs::absolute(study_folder(command.file, command.folder));
   if (path.string().find_first_of("\r\n%\\\"") != std::string::npos) {
     throw config::ConfigError(
         fmt::format("--out {}: Slurm takes %, \\, quotes and line ends in paths for something "
@@ -111,7 +111,7 @@ int submit_study(const StudyCommand& command) {
                     path.string()));
   }
   // Everything that is wrong with the study shows here, not in a log on a node.
-  const study::Study study = study::make_study(study::load_study(command.submitted));
+  const study::Study study = study::make_study(study::load_study(command.file));
   const study::StudyFolder folder(path, study::facts_of(study, file.stem().string()));
   const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
   if (missing.empty()) {
