@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <type_traits>
@@ -50,18 +49,11 @@ void assign_number(const Key& key, Number& target, const Value& value, std::stri
 /// Reads a value as TOML would: a flag, a whole number or a number, otherwise text.
 Value parse_value(std::string_view text) {
   if (text == "true" || text == "false") return text == "true";
-  const char* end = text.data() + text.size();
-  const bool is_hex = text.starts_with("0x") || text.starts_with("0X");
-  std::int64_t integer = 0;
-  if (is_hex) {
-    const auto [at, error] = std::from_chars(text.data() + 2, end, integer, 16);
-    if (error == std::errc() && at == end) return integer;
+  if (text.starts_with("0x") || text.starts_with("0X")) {
+    if (const auto hexadecimal = rig::parse_number<std::int64_t>(text.substr(2), 16)) return *hexadecimal;
   }
-  if (const auto [at, error] = std::from_chars(text.data(), end, integer); error == std::errc() && at == end) {
-    return integer;
-  }
-  double real = 0.0;
-  if (const auto [at, error] = std::from_chars(text.data(), end, real); error == std::errc() && at == end) return real;
+  if (const auto integer = rig::parse_number<std::int64_t>(text)) return *integer;
+  if (const auto real = rig::parse_number<double>(text)) return *real;
   return std::string(text);
 }
 

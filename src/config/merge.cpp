@@ -6,7 +6,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -20,6 +19,7 @@
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"
 
@@ -375,10 +375,7 @@ rig::RigParameters identity(const Settings& s) {
 
 std::uint64_t sensor_seed(const Settings& s) {
   if (s.sensor_seed.empty()) return static_cast<std::uint64_t>(s.seed);
-  std::uint64_t seed = 0;
-  const char* end = s.sensor_seed.data() + s.sensor_seed.size();
-  const auto [at, problem] = std::from_chars(s.sensor_seed.data(), end, seed);
-  if (problem == std::errc() && at == end) return seed;
+  if (const auto seed = rig::parse_number<std::uint64_t>(s.sensor_seed)) return *seed;
   throw ConfigError(fmt::format("run.sensor_seed = \"{}\" is not valid; give a whole number in [0, 2^64), or nothing",
                                 s.sensor_seed));
 }

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 
 #include "config/reader.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 
@@ -155,17 +155,14 @@ class ProfileReader {
         reader_.fail(place, fmt::format("file \"{}\": the first line is wrong; give time_s,value", name));
       }
       if (row == 1 || line.empty()) continue;
-      const char* end = line.data() + line.size();
-      double time_s = 0.0;
-      double value = 0.0;
-      const auto first = std::from_chars(line.data(), end, time_s);
-      const bool comma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
-      const auto second = comma ? std::from_chars(first.ptr + 1, end, value) : first;
-      if (!comma || second.ec != std::errc() || second.ptr != end || !facts_.range.contains(value)) {
+      const std::size_t comma = std::min(line.find(','), line.size());
+      const auto time_s = rig::parse_number<double>(line.substr(0, comma));
+      const auto value = rig::parse_number<double>(line.substr(std::min(comma + 1, line.size())));
+      if (!time_s || !value || !facts_.range.contains(*value)) {
         reader_.fail(place, fmt::format("file \"{}\", line {}: give a time in s and a value in {}", name, row,
                                         facts_.range.text()));
       }
-      add_point(time_s, {.value = value, .unit = facts_.unit, .range = facts_.range, .place = place}, place);
+      add_point(*time_s, {.value = *value, .unit = facts_.unit, .range = facts_.range, .place = place}, place);
     }
     if (profile_.points.empty())
       reader_.fail(place, fmt::format("file \"{}\" holds no points; give at least one", name));

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <charconv>
 #include <memory>
 
 #include "commands/sender.hpp"
 #include "config/config_error.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -15,12 +15,8 @@ namespace abs_hil::program {
 namespace {
 
 double number_of(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) {
-    throw config::ConfigError("send: '" + text + "' is not a number; give a decimal number");
-  }
-  return value;
+  if (const auto value = rig::parse_number<double>(text)) return *value;
+  throw config::ConfigError("send: '" + text + "' is not a number; give a decimal number");
 }
 
 commands::Order order_of(const std::vector<std::string>& words) {

@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -14,6 +13,7 @@
 #include "config/config_error.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
 #include "study/runs.hpp"
@@ -73,13 +73,11 @@ namespace {
 std::string name_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
 
 study::Shard read_shard(const std::string& text) {
-  study::Shard shard;
-  const char* end = text.data() + text.size();
-  const auto [slash, problem] = std::from_chars(text.data(), end, shard.number);
-  if (problem == std::errc() && slash != end && *slash == '/') {
-    const auto [at, error] = std::from_chars(slash + 1, end, shard.of);
-    if (error == std::errc() && at == end && shard.number >= 1 && shard.number <= shard.of) return shard;
-  }
+  const std::string_view words = text;
+  const std::size_t slash = std::min(words.find('/'), words.size());
+  const auto number = rig::parse_number<std::uint64_t>(words.substr(0, slash));
+  const auto of = rig::parse_number<std::uint64_t>(words.substr(std::min(slash + 1, words.size())));
+  if (number && of && *number >= 1 && *number <= *of) return {*number, *of};
   throw config::ConfigError(
       fmt::format("--shard {}: give I/N with 1 <= I <= N, as in --shard 3/8 for the third of eight parts", text));
 }

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
+#include <concepts>
 #include <cstddef>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace abs_hil::rig {
@@ -30,6 +34,14 @@ template <typename... Values>
   std::string text;
   for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
   return text;
+}
+
+/// The whole text as a number, an integer in the base if one is given; nothing for any other text.
+template <typename Number>
+[[nodiscard]] std::optional<Number> parse_number(std::string_view text, std::same_as<int> auto... base) noexcept {
+  Number value{};
+  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
+  return error == std::errc() && at == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace abs_hil::rig
