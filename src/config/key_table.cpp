@@ -217,18 +217,19 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
   carry_over(key);
 }
 
-std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment, std::string_view origin) {
+std::pair<std::string, Value> KeyTable::parsed(std::string_view assignment, std::string_view origin) const {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos || equals == 0) {
     throw ConfigError(
         fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
   }
-  return {rig::trimmed(assignment.substr(0, equals)), rig::trimmed(assignment.substr(equals + 1))};
+  const std::string_view name = rig::trimmed(assignment.substr(0, equals));
+  return {std::string(name), parse_value(find(name, origin), rig::trimmed(assignment.substr(equals + 1)))};
 }
 
 void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
-  const auto [name, text] = split_assignment(assignment, origin);
-  set(name, parse_value(find(name, origin), text), origin);
+  const auto [name, value] = parsed(assignment, origin);
+  set(name, value, origin);
 }
 
 std::string KeyTable::to_toml() const {

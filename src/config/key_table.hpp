@@ -27,10 +27,6 @@ struct Key : rig::OptionFacts {
 /// A value from a file or from the command line, before its key has checked the type.
 using Value = std::variant<double, std::int64_t, bool, std::string>;
 
-/// The name and the value of "name=value", without blanks around them. Throws ConfigError for any other text.
-[[nodiscard]] std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment,
-                                                                             std::string_view origin);
-
 /// Converts `text` to a value for the key. A key of text takes it unchanged; other keys read it as TOML would.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);
 
@@ -71,7 +67,10 @@ class KeyTable {
   /// Sets a value. `origin` says where it came from ("--set", "FILE:LINE"). Throws ConfigError for an unknown name
   /// (with the nearest known one), a value of the wrong type or out of range; then nothing changes.
   void set(std::string_view name, const Value& value, std::string_view origin);
-  /// The same for `name=value` as text.
+  /// The name and the value of "name=value", without blanks around them. Throws ConfigError for any other text, and for
+  /// an unknown name.
+  [[nodiscard]] std::pair<std::string, Value> parsed(std::string_view assignment, std::string_view origin) const;
+  /// Sets `name=value`.
   void set_text(std::string_view assignment, std::string_view origin);
 
   [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }

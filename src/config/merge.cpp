@@ -1,5 +1,5 @@
-// Merges what people and files say about a run. `fill` has the order of the sources; the checks beside it refuse what
-// contradicts.
+// Merges what people and files say about a run. `read_sources` has the order of the sources; the checks beside it
+// refuse what contradicts.
 #include "config/merge.hpp"
 
 #include <fmt/format.h>
@@ -105,34 +105,6 @@ void apply_board_policy(Settings& s, const KeyTable& keys, bool virtual_time) {
   runtime::apply_board_limits(s.rig.parameters, s.control.rate_Hz, s.gate, s.driver);
 }
 
-/// The configuration files of a run, each read once.
-struct Files {
-  std::vector<FileValue> plant{};
-  std::vector<FileValue> model{};
-  std::vector<FileValue> config{};
-};
-
-Files read_files(const Sources& sources, const std::string& default_plant) {
-  const bool on_rig = sources.backend == "rig";
-  if (on_rig && sources.plant) {
-    throw ConfigError(fmt::format(
-        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *sources.plant));
-  }
-  const std::filesystem::path plant = plant_file(sources.plant.value_or(default_plant));
-  Files files{.plant = on_rig ? read_model(plant) : read_file(plant, Tables::of_plant)};
-  if (sources.model) files.model = read_model(plant_file(*sources.model, "--model"));
-  if (sources.config_file) files.config = read_file(*sources.config_file);
-  return files;
-}
-
-std::vector<FileValue> settings_of(const Script& script) {
-  std::vector<FileValue> values;
-  for (const Setting& setting : script.settings) {
-    values.push_back({setting.key, setting.value, script.at(setting.place)});
-  }
-  return values;
-}
-
 /// The names of plant and model. On a rig the plant's name is the model's.
 void set_names(Settings& s, const Sources& sources) {
   if (sources.plant) s.plant_name = *sources.plant;
@@ -155,60 +127,57 @@ void complete_identity(const Settings& s, KeyTable& keys) {
   }
 }
 
-/// Everything but what the script asks for beyond its settings.
-void fill(Settings& s, KeyTable& keys, const Sources& sources, const Files& files, const Script& script) {
-  s.backend = sources.backend;
-  if (s.on_rig()) keys.leave_out_plant();
-  for (const std::string& assignment : sources.defaults) keys.set_text(assignment, "default");
-  set_names(s, sources);
-  set_all(files.plant, keys);
-  set_all(files.model, keys);
-  set_all(settings_of(script), keys);
-  if (sources.prior_file)
-    set_all(read_prior(*sources.prior_file, s.model_name.empty() ? s.plant_name : s.model_name), keys);
-  set_all(files.config, keys);
+/// What files and people say, later ones above earlier ones. The settings of the script rank between the two lists.
+struct Said {
+  std::vector<FileValue> below{};
+  std::vector<FileValue> above{};
+};
 
-  const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
-    if (value) keys.set_text(std::string(key) + '=' + *value, option);
-  };
-  set("control.controller", sources.controller, "--controller");
-  set(experiment_key, sources.experiment, "--experiment");
-  set("control.slip_ref", sources.slip_ref, "--slip-ref");
-  set("control.rate_Hz", sources.rate_Hz, "--rate");
-  set("run.seed", sources.seed, "--seed");
-  for (const std::string& assignment : sources.assignments) keys.set_text(assignment, "--set");
-  set_all(sources.changes, keys);
-  for (const std::string& injection : sources.injections) {
-    if (driver::parse_injections(injection).empty())
-      throw ConfigError("--inject is empty; give a fault, or leave it out");
-    s.inject += (s.inject.empty() ? "" : ",") + injection;
+Said read_sources(const Sources& sources, Settings& s, const KeyTable& keys) {
+  if (s.on_rig() && sources.plant) {
+    throw ConfigError(fmt::format(
+        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *sources.plant));
   }
-  if (sources.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
-  if (s.on_rig()) complete_identity(s, keys);
-  s.realtime.mode = realtime_mode(sources.realtime, s);
+  Said said;
+  const auto add = [](std::vector<FileValue>& to, const std::vector<FileValue>& values) {
+    to.insert(to.end(), values.begin(), values.end());
+  };
+  const auto add_text = [&keys](std::vector<FileValue>& to, std::string_view assignment, const char* origin) {
+    const auto [name, value] = keys.parsed(assignment, origin);
+    to.push_back({name, value, origin});
+  };
+  for (const std::string& assignment : sources.defaults) add_text(said.below, assignment, "default");
+  const std::filesystem::path plant = plant_file(sources.plant.value_or(s.plant_name));
+  add(said.below, s.on_rig() ? read_model(plant) : read_file(plant, Tables::of_plant));
+  if (sources.model) add(said.below, read_model(plant_file(*sources.model, "--model")));
+  set_names(s, sources);
+  if (sources.prior_file)
+    add(said.above, read_prior(*sources.prior_file, s.model_name.empty() ? s.plant_name : s.model_name));
+  if (sources.config_file) add(said.above, read_file(*sources.config_file));
+  const auto add_option = [&](const char* key, const std::optional<std::string>& value, const char* option) {
+    if (value) add_text(said.above, fmt::format("{}={}", key, *value), option);
+  };
+  add_option("control.controller", sources.controller, "--controller");
+  add_option(experiment_key, sources.experiment, "--experiment");
+  add_option("control.slip_ref", sources.slip_ref, "--slip-ref");
+  add_option("control.rate_Hz", sources.rate_Hz, "--rate");
+  add_option("run.seed", sources.seed, "--seed");
+  for (const std::string& assignment : sources.assignments) add_text(said.above, assignment, "--set");
+  add(said.above, sources.changes);
+  if (sources.wait_for_start) add_text(said.above, "experiment.wait_for_start=true", "--wait-for-start");
+  return said;
 }
 
 /// The experiment that options and files name: its script's settings rank below theirs, so it must be known before they
 /// are set. A name that is no text is refused when it is set.
-std::shared_ptr<const Script> script_of(const Sources& sources, const Files& files) {
+std::shared_ptr<const Script> script_of(const Sources& sources, const Said& said) {
   std::string name = experiment::ExperimentOptions().name;
-  const auto look = [&name](const std::vector<FileValue>& values) {
-    for (const FileValue& value : values) {
-      if (const auto* text = std::get_if<std::string>(&value.value); text != nullptr && value.name == experiment_key)
-        name = *text;
+  for (const auto* values : {&said.below, &said.above}) {
+    for (const FileValue& value : *values) {
+      const auto* text = std::get_if<std::string>(&value.value);
+      if (text != nullptr && value.name == experiment_key) name = *text;
     }
-  };
-  const auto look_at_texts = [&](const std::vector<std::string>& assignments) {
-    for (const std::string& assignment : assignments) {
-      const auto [key, text] = split_assignment(assignment, "--set");
-      if (key == experiment_key) name = text;
-    }
-  };
-  look_at_texts(sources.defaults);
-  look(files.config);
-  name = sources.experiment.value_or(name);
-  look_at_texts(sources.assignments);
-  look(sources.changes);
+  }
   std::shared_ptr<const Script> script = find(name);
   if (!sources.one_of_series) return script;
   auto single = std::make_shared<Script>(*script);
@@ -216,13 +185,29 @@ std::shared_ptr<const Script> script_of(const Sources& sources, const Files& fil
   return single;
 }
 
+/// Everything but what the script asks for beyond its settings.
+void fill(Settings& s, KeyTable& keys, const Sources& sources, const Said& said, const Script& script) {
+  set_all(said.below, keys);
+  for (const Setting& setting : script.settings) keys.set(setting.key, setting.value, script.at(setting.place));
+  set_all(said.above, keys);
+  for (const std::string& injection : sources.injections) {
+    if (driver::parse_injections(injection).empty())
+      throw ConfigError("--inject is empty; give a fault, or leave it out");
+    s.inject += (s.inject.empty() ? "" : ",") + injection;
+  }
+  if (s.on_rig()) complete_identity(s, keys);
+  s.realtime.mode = realtime_mode(sources.realtime, s);
+}
+
 /// Everything but the texts of the configuration.
 void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   Settings& s = merged.settings;
-  const Files files = read_files(sources, s.plant_name);
-  merged.script = script_of(sources, files);
+  s.backend = sources.backend;
+  if (s.on_rig()) keys.leave_out_plant();
+  const Said said = read_sources(sources, s, keys);
+  merged.script = script_of(sources, said);
   const Script& script = *merged.script;
-  fill(s, keys, sources, files, script);
+  fill(s, keys, sources, said, script);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
   }
