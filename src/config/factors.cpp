@@ -3,8 +3,6 @@
 // A factor's value at the probability u is F^-1(u): from + u (to - from) for a uniform range, from (to / from)^u for a
 // logarithmic one, and for a normal range cut off at least and most the quantile of the normal distribution at
 // F(least) + u (F(most) - F(least)).
-#include "config/factors.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
