@@ -40,13 +40,8 @@ std::map<std::string, std::string> identity_texts(const RigIdentity& identity) {
 bool is_cap(const std::string& name) { return name.ends_with("_duty_max"); }
 
 std::string file_name(const BoardRecord& record) {
-  std::string name = record.kind + '-' + (record.board.place.empty() ? "board" : record.board.place);
-  for (char& c : name) {
-    const bool plain =
-        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '.';
-    if (!plain) c = '_';
-  }
-  return name + ".json";
+  return rig::plain_name(record.kind + '-' + (record.board.place.empty() ? "board" : record.board.place), "-.") +
+         ".json";
 }
 
 nlohmann::ordered_json optional_json(const std::optional<double>& value) {

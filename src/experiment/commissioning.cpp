@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -31,18 +32,6 @@ constexpr std::int64_t watch_ns = 50 * rig::ns_per_ms;
 void require(bool in_range, const char* what, double value, const char* range) {
   if (!in_range) throw std::invalid_argument(formatted("%s = %g: give a number in %s", what, value, range));
 }
-
-/// Makes the rig safe, however a step ends.
-class SafeAtEnd {
- public:
-  explicit SafeAtEnd(driver::RigDriver& driver) : driver_(driver) {}
-  SafeAtEnd(const SafeAtEnd&) = delete;
-  SafeAtEnd& operator=(const SafeAtEnd&) = delete;
-  ~SafeAtEnd() { static_cast<void>(driver_.deactivate()); }
-
- private:
-  driver::RigDriver& driver_;
-};
 
 }  // namespace
 
@@ -74,7 +63,8 @@ CommissioningResult Commissioning::unless_stopped(CommissioningResult result) co
 }
 
 CommissioningResult Commissioning::run() {
-  const SafeAtEnd safe(driver_);
+  // Makes the rig safe, however a step ends.
+  const std::shared_ptr<void> at_end(nullptr, [this](void*) { static_cast<void>(driver_.deactivate()); });
   for (const auto step : {&Commissioning::read_board, &Commissioning::turn_by_hand, &Commissioning::drive_pulse,
                           &Commissioning::pull_cable, &Commissioning::brake_pulse}) {
     const CommissioningResult result = (this->*step)();

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cctype>
 #include <memory>
 
 #include "config/config_error.hpp"
@@ -12,6 +11,7 @@
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "study/comparison.hpp"
 #include "study/parallel.hpp"
 
@@ -34,13 +34,6 @@ struct CompareOptions {
   std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
   std::optional<std::string> run_folder{};  ///< --out: its folder
 };
-
-/// A controller's heading as the name of a folder.
-std::string folder_name(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_' && c != '.' && c != '='; }, '_');
-  return name;
-}
 
 /// Opens a result file. Called before the runs, so that a bad path is reported at once.
 std::unique_ptr<files::ResultFile> open(const std::optional<std::string>& path) try {
@@ -70,7 +63,7 @@ int record(const CompareOptions& options, const study::Study& study, const std::
   int status = exit_completed;
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     std::optional<std::string> folder = options.run_folder;
-    if (folder && contenders.size() > 1) *folder += '/' + folder_name(contenders[c].name);
+    if (folder && contenders.size() > 1) *folder += '/' + rig::plain_name(contenders[c].name, "-_.=");
     status = std::max(status, record_run(study, repetition * contenders.size() + c, folder, command_line));
   }
   return status;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -16,6 +15,7 @@
 #include "config/plan.hpp"
 #include "files/result_file.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
@@ -56,8 +56,7 @@ int validate(const config::Sources& sources) {
 }
 
 int init_rig(const config::Settings& settings, const std::string& name) {
-  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
-  if (name.empty() || !std::all_of(name.begin(), name.end(), is_plain)) {
+  if (name.empty() || rig::plain_name(name, "-_") != name) {
     throw config::ConfigError(fmt::format("init-rig: \"{}\": give a name of letters, digits, - and _", name));
   }
   const std::filesystem::path file = name + ".toml";

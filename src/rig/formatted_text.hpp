@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <concepts>
 #include <cstddef>
@@ -33,6 +34,15 @@ template <typename... Values>
 [[nodiscard]] inline std::string joined(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
+  return text;
+}
+
+/// The text as a plain name: whatever is neither a letter or a digit of ASCII nor one of `also` becomes '_'.
+[[nodiscard]] inline std::string plain_name(std::string text, std::string_view also) {
+  const auto is_odd = [also](unsigned char c) {
+    return std::isalnum(c) == 0 && also.find(static_cast<char>(c)) == also.npos;
+  };
+  std::ranges::replace_if(text, is_odd, '_');
   return text;
 }
 
