@@ -354,10 +354,6 @@ std::string prior_text(const nlohmann::ordered_json& learnt, std::string_view mo
   return text;
 }
 
-rig::RigParameters identity(const Settings& s) {
-  return s.on_rig() ? s.rig.parameters : plant_sim::identity_of(s.plant);
-}
-
 std::uint64_t sensor_seed(const Settings& s) {
   if (s.sensor_seed.empty()) return static_cast<std::uint64_t>(s.seed);
   if (const auto seed = rig::parse_number<std::uint64_t>(s.sensor_seed)) return *seed;

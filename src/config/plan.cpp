@@ -32,6 +32,34 @@ rig::Phase kind_of(const PhaseScript& phase) {
   return phase.motor ? rig::Phase::accelerate : rig::Phase::coast;
 }
 
+/// The value of the number under these settings. Throws ConfigError if it is out of its range.
+double value_of(const Script& script, const Number& number, const KeyTable& keys) {
+  if (number.key.empty()) return number.value;
+  const Key* key = find_key(keys.keys(), number.key);
+  const double value = key == nullptr ? std::nan("") : number_of(value_of(*key)).value_or(std::nan(""));
+  if (!number.range.contains(value)) {
+    throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
+                                  script.at(number.place), number.key, value, number.range.text(),
+                                  number.unit.empty() ? "" : " ", number.unit));
+  }
+  return value;
+}
+
+/// True if the condition holds under these settings.
+bool holds(const When& when, const KeyTable& keys) {
+  const Key* key = find_key(keys.keys(), when.key);
+  if (key == nullptr) return false;
+  if (const std::optional<double> value = number_of(value_of(*key))) {
+    const double other = number_of(parse_value(*key, when.value)).value();  // the reader has checked it
+    if (when.operation == "=") return *value == other;
+    if (when.operation == "!=") return *value != other;
+    if (when.operation == "<") return *value < other;
+    if (when.operation == ">") return *value > other;
+    return when.operation == "<=" ? *value <= other : *value >= other;
+  }
+  return (text_of(value_of(*key)) == when.value) == (when.operation == "=");
+}
+
 class Planner {
  public:
   Planner(const Script& script, const Settings& settings) : script_(script), settings_(settings), keys_(settings_) {}
@@ -58,11 +86,7 @@ class Planner {
     std::vector<experiment::Profile::Point> points;
     points.reserve(script.points.size());
     for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
-    try {
-      return experiment::Profile(std::move(points), script.between);
-    } catch (const std::invalid_argument& error) {
-      throw ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
-    }
+    return experiment::Profile(std::move(points), script.between);
   }
   /// Stores a constant in `constant` and returns an empty profile; returns any other profile.
   [[nodiscard]] experiment::Profile profile_or(const std::optional<ProfileScript>& script, double& constant) const {
@@ -156,32 +180,6 @@ double reached_in(const experiment::PhasePlan& phase, const Reached& reached) {
 }
 
 }  // namespace
-
-double value_of(const Script& script, const Number& number, const KeyTable& keys) {
-  if (number.key.empty()) return number.value;
-  const Key* key = find_key(keys.keys(), number.key);
-  const double value = key == nullptr ? std::nan("") : number_of(value_of(*key)).value_or(std::nan(""));
-  if (!number.range.contains(value)) {
-    throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
-                                  script.at(number.place), number.key, value, number.range.text(),
-                                  number.unit.empty() ? "" : " ", number.unit));
-  }
-  return value;
-}
-
-bool holds(const When& when, const KeyTable& keys) {
-  const Key* key = find_key(keys.keys(), when.key);
-  if (key == nullptr) return false;
-  if (const std::optional<double> value = number_of(value_of(*key))) {
-    const double other = number_of(parse_value(*key, when.value)).value();  // the reader has checked it
-    if (when.operation == "=") return *value == other;
-    if (when.operation == "!=") return *value != other;
-    if (when.operation == "<") return *value < other;
-    if (when.operation == ">") return *value > other;
-    return when.operation == "<=" ? *value <= other : *value >= other;
-  }
-  return (text_of(value_of(*key)) == when.value) == (when.operation == "=");
-}
 
 bool means_to_stop(const Plan& plan, double end_speed_m_s) {
   const auto& phases = plan.phases;

@@ -45,7 +45,7 @@ struct Settings {
   /// The rig as controllers, observers, actuator estimate and feed-forward know it. KeyTable gives each value that
   /// nobody sets the plant's value.
   ABS_HIL_GROUP(rig::RigParameters, model, "model.", {});
-  /// What the rig behind a board is: see `identity`.
+  /// What the rig behind a board is. In simulation that is the plant.
   ABS_HIL_GROUP(experiment::RigIdentity, rig, "rig.", {});
   ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
   ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
@@ -69,9 +69,6 @@ struct Settings {
 
   [[nodiscard]] bool on_rig() const noexcept { return backend == "rig"; }
 };
-
-/// What the limits of gate and checks know of the rig, never the model: on a board `rig.`, in simulation the plant.
-[[nodiscard]] rig::RigParameters identity(const Settings& s);
 
 /// The seed of the encoders' first positions. Throws ConfigError for a text that is no such number.
 [[nodiscard]] std::uint64_t sensor_seed(const Settings& s);

@@ -107,6 +107,18 @@ std::string described(const driver::BoardIdentity& board) {
   return (board.place.empty() ? "board" : board.place) + (board.logic.empty() ? "" : ", " + board.logic);
 }
 
+/// `abs_hil commission` with the options of `driver.` that differ from their defaults, and the identity's source.
+std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
+  auto defaults = texts_of(driver::DriverOptions{}, "driver.");
+  std::string command = "abs_hil commission";
+  rig::for_each_option(options, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    const std::string text = fmt::format("{}", value);
+    if (text != defaults[name]) command += " --set " + name + '=' + text;
+  });
+  if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
+  return command;
+}
+
 }  // namespace
 
 BoardRecord describe_board(const driver::DriverOptions& options, const RigIdentity& identity,
@@ -183,17 +195,6 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
       "the commissioning record cannot be written (" + problems +
       "); give a folder with --set driver.records=DIR, or make one: sudo install -d -g abs_hil -m "
       "2775 /var/lib/abs_hil/boards");
-}
-
-std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
-  auto defaults = texts_of(driver::DriverOptions{}, "driver.");
-  std::string command = "abs_hil commission";
-  rig::for_each_option(options, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    const std::string text = fmt::format("{}", value);
-    if (text != defaults[name]) command += " --set " + name + '=' + text;
-  });
-  if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
-  return command;
 }
 
 std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,

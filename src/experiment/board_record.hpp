@@ -61,7 +61,4 @@ std::filesystem::path write_record(const BoardRecord& record, const std::vector<
 std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
                            const driver::BoardIdentity& board);
 
-/// `abs_hil commission` with the options of `driver.` that differ from their defaults, and the identity's source.
-[[nodiscard]] std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity);
-
 }  // namespace abs_hil::experiment

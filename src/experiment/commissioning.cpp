@@ -33,6 +33,16 @@ void require(bool in_range, const char* what, double value, const char* range) {
   if (!in_range) throw std::invalid_argument(formatted("%s = %g: give a number in %s", what, value, range));
 }
 
+std::string in_words(const OutputTimes& times) {
+  if (!times.reported) return "this board does not report its outputs: its watchdog and its release were not measured";
+  const std::string watchdog =
+      times.watchdog_ms
+          ? formatted("without commands the board ends its outputs by itself after %.1f ms", *times.watchdog_ms)
+          : formatted("without commands the board HOLDS its outputs, for %.0f ms at least: it has no watchdog",
+                      times.watched_ms);
+  return watchdog + formatted("; the safe state was verified %.3f ms after its order", times.release_ms.value_or(0.0));
+}
+
 }  // namespace
 
 WheelCounts travel_between(const rig::Measurement& before, const rig::Measurement& after) noexcept {
@@ -58,17 +68,13 @@ Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, D
   require(options.encoder_counts_per_rev > 0, "encoder counts per turn", options.encoder_counts_per_rev, "(0, inf)");
 }
 
-CommissioningResult Commissioning::unless_stopped(CommissioningResult result) const {
-  return stop_requested_() ? CommissioningResult::interrupted : result;
-}
-
 CommissioningResult Commissioning::run() {
   // Makes the rig safe, however a step ends.
   const std::shared_ptr<void> at_end(nullptr, [this](void*) { static_cast<void>(driver_.deactivate()); });
   for (const auto step : {&Commissioning::read_board, &Commissioning::turn_by_hand, &Commissioning::drive_pulse,
                           &Commissioning::pull_cable, &Commissioning::brake_pulse}) {
     const CommissioningResult result = (this->*step)();
-    if (result != CommissioningResult::passed) return unless_stopped(result);
+    if (result != CommissioningResult::passed) return stop_requested_() ? CommissioningResult::interrupted : result;
   }
   const driver::IoResult result = driver_.deactivate();
   if (!result.ok()) {
@@ -300,7 +306,7 @@ CommissioningResult Commissioning::brake_pulse() {
   }
   if (!measure_outputs()) return CommissioningResult::failed;
   if (stop_requested_()) return CommissioningResult::interrupted;
-  dialog_.tell("ok: " + output_text());
+  dialog_.tell("ok: " + in_words(output_times_));
   return is_seen(options_.emulated
                      ? "Did the emulated brake grip and release? Nobody can see or hear it: look at the column "
                        "brake_torque_Nm of the emulator's --truth file."
@@ -345,17 +351,6 @@ bool Commissioning::measure_outputs() {
   guard_.end(ended.ok());
   if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + reason_and_error(ended));
   return driven && ended.ok();
-}
-
-std::string Commissioning::output_text() const {
-  const OutputTimes& times = output_times_;
-  if (!times.reported) return "this board does not report its outputs: its watchdog and its release were not measured";
-  const std::string watchdog =
-      times.watchdog_ms
-          ? formatted("without commands the board ends its outputs by itself after %.1f ms", *times.watchdog_ms)
-          : formatted("without commands the board HOLDS its outputs, for %.0f ms at least: it has no watchdog",
-                      times.watched_ms);
-  return watchdog + formatted("; the safe state was verified %.3f ms after its order", times.release_ms.value_or(0.0));
 }
 
 }  // namespace abs_hil::experiment

@@ -117,8 +117,6 @@ class Commissioning {
   /// Falls silent with the brake on and sees what the board does by itself; then measures how soon it is safe.
   [[nodiscard]] bool measure_outputs();
   void watch_silence();
-  [[nodiscard]] std::string output_text() const;
-  [[nodiscard]] CommissioningResult unless_stopped(CommissioningResult result) const;
 
   driver::RigDriver& driver_;
   runtime::Clock& clock_;

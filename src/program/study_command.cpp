@@ -70,6 +70,14 @@ std::string study_folder(const std::string& file, const std::optional<std::strin
 
 namespace {
 
+/// "420 ms", "1.6 s", "12 s", "3 min", "5.2 h".
+std::string duration_text(double seconds) {
+  if (seconds < 1.0) return fmt::format("{:.0f} ms", 1e3 * seconds);
+  if (seconds < 90.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 1 : 0);
+  if (seconds < 5400.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
 std::string name_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
 
 study::Shard read_shard(const std::string& text) {
@@ -222,13 +230,6 @@ void RunProgress::show(std::uint64_t done) {
                                              duration_text(static_cast<double>(runs_ - done) / rate_Hz));
   fmt::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
   std::fflush(stderr);
-}
-
-std::string duration_text(double seconds) {
-  if (seconds < 1.0) return fmt::format("{:.0f} ms", 1e3 * seconds);
-  if (seconds < 90.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 1 : 0);
-  if (seconds < 5400.0) return fmt::format("{:.0f} min", seconds / 60.0);
-  return fmt::format("{:.1f} h", seconds / 3600.0);
 }
 
 }  // namespace abs_hil::program

@@ -82,7 +82,4 @@ class RunProgress {
   std::mutex mutex_{};
 };
 
-/// "420 ms", "1.6 s", "12 s", "3 min", "5.2 h".
-[[nodiscard]] std::string duration_text(double seconds);
-
 }  // namespace abs_hil::program
