@@ -1,6 +1,4 @@
 // An experiment in words, as `abs_hil validate` prints it, and a plant's file to be filled in.
-#include "config/explain.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>

@@ -127,6 +127,37 @@ void complete_identity(const Settings& s, KeyTable& keys) {
   }
 }
 
+constexpr std::int64_t prior_format = 1;
+
+/// The values of a prior (--prior: what the controller has learnt of the rig in the last braking), without its head,
+/// which says for which model it holds. A file that is not there is the first braking's, and has none.
+/// @param model  name of the run's model
+/// Throws ConfigError for a file that is none, of another format, or learnt with another model.
+std::vector<FileValue> read_prior(const std::filesystem::path& file, std::string_view model) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error) return {};
+  std::vector<FileValue> values = read_file(file);
+  const auto refuse = [&](const std::string& why) {
+    throw ConfigError(
+        fmt::format("--prior {}: {}; give the file that a run with --prior has written, or remove it to begin anew",
+                    file.string(), why));
+  };
+  const auto taken = [&](std::string_view name) {
+    const auto found = std::ranges::find(values, name, &FileValue::name);
+    if (found == values.end()) refuse(fmt::format("has no {}", name));
+    const Value value = found->value;
+    values.erase(found);
+    return value;
+  };
+  if (taken("prior.format") != Value(prior_format)) refuse(fmt::format("is not of format {}", prior_format));
+  if (taken("prior.model") != Value(std::string(model)))
+    refuse(fmt::format("was learnt with another model than {}, which is that of this run", model));
+  for (const FileValue& value : values) {
+    if (!value.name.starts_with("control.")) refuse(fmt::format("holds {}, which no controller learns", value.name));
+  }
+  return values;
+}
+
 /// What files and people say, later ones above earlier ones. The settings of the script rank between the two lists.
 struct Said {
   std::vector<FileValue> below{};
@@ -314,35 +345,6 @@ void refuse_nested(const Script& series, const Script& experiment) {
 
 bool asks(const Script& script) noexcept {
   return std::ranges::any_of(script.phases, [](const PhaseScript& phase) { return !phase.ask.empty(); });
-}
-
-namespace {
-constexpr std::int64_t prior_format = 1;
-}  // namespace
-
-std::vector<FileValue> read_prior(const std::filesystem::path& file, std::string_view model) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error) && !error) return {};
-  std::vector<FileValue> values = read_file(file);
-  const auto refuse = [&](const std::string& why) {
-    throw ConfigError(
-        fmt::format("--prior {}: {}; give the file that a run with --prior has written, or remove it to begin anew",
-                    file.string(), why));
-  };
-  const auto taken = [&](std::string_view name) {
-    const auto found = std::ranges::find(values, name, &FileValue::name);
-    if (found == values.end()) refuse(fmt::format("has no {}", name));
-    const Value value = found->value;
-    values.erase(found);
-    return value;
-  };
-  if (taken("prior.format") != Value(prior_format)) refuse(fmt::format("is not of format {}", prior_format));
-  if (taken("prior.model") != Value(std::string(model)))
-    refuse(fmt::format("was learnt with another model than {}, which is that of this run", model));
-  for (const FileValue& value : values) {
-    if (!value.name.starts_with("control.")) refuse(fmt::format("holds {}, which no controller learns", value.name));
-  }
-  return values;
 }
 
 std::string prior_text(const nlohmann::ordered_json& learnt, std::string_view model) {

@@ -68,12 +68,6 @@ void refuse_nested(const Script& series, const Script& experiment);
 /// True if a phase of the script asks a person.
 [[nodiscard]] bool asks(const Script& script) noexcept;
 
-/// The values of a prior (--prior: what the controller has learnt of the rig in the last braking), without its head,
-/// which says for which model it holds. A file that is not there is the first braking's, and has none.
-/// @param model  name of the run's model
-/// Throws ConfigError for a file that is none, of another format, or learnt with another model.
-[[nodiscard]] std::vector<FileValue> read_prior(const std::filesystem::path& file, std::string_view model);
-
 /// The text of a prior.
 /// @param learnt  keys below control. and their values
 [[nodiscard]] std::string prior_text(const nlohmann::ordered_json& learnt, std::string_view model);

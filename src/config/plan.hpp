@@ -39,4 +39,8 @@ void apply(const Script& script, config::Settings& settings);
 /// empty: none.
 [[nodiscard]] std::vector<std::string> certain_faults(const Plan& plan, const config::Settings& settings);
 
+/// Describes in words how the script runs under these settings: phases, their ends, limits, events, series. Throws
+/// ConfigError if the script cannot run under these settings.
+[[nodiscard]] std::string explain(const Script& script, const Settings& settings);
+
 }  // namespace abs_hil::config

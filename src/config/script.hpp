@@ -350,4 +350,7 @@ using FileReader = std::function<std::optional<std::string>(const std::string& n
 /// The experiments in config_dir()/experiments, by name.
 [[nodiscard]] std::vector<std::shared_ptr<const Script>> known_experiments();
 
+/// The JSON Schema (draft 2020-12) of scripts, for editors. It is made from the parser's own grammar.
+[[nodiscard]] nlohmann::ordered_json schema();
+
 }  // namespace abs_hil::config

@@ -10,7 +10,6 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "config/config_error.hpp"
-#include "config/explain.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "files/result_file.hpp"

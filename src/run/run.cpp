@@ -143,7 +143,7 @@ Run::Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts
       driver_(own_driver_ ? *own_driver_ : *given.driver),
       logic_(std::move(parts)),
       outer_logic_(given.logic ? given.logic(logic_) : nullptr),
-      gate_(given.checks_wheels ? logic_.make_gate(settings().gate) : logic_.make_gate_without_wheels(settings().gate)),
+      gate_(logic_.make_gate(settings().gate, given.checks_wheels)),
       ring_(given.stepped ? stepped_ring_capacity : ring_capacity),
       executive_(clock_, driver_, outer_logic_ ? *outer_logic_ : logic_, gate_, ring_, prepared.period_ns,
                  given.overruns.value_or(settings().realtime.overruns), !given.stepped),
