@@ -60,38 +60,6 @@ std::vector<FileValue> values_of(const toml::table& table, const fs::path& file)
   return values;
 }
 
-bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
-
-bool names_plant(const std::vector<FileValue>& values) {
-  return std::any_of(values.begin(), values.end(), [](const FileValue& value) { return is_of_plant(value.name); });
-}
-
-/// Values of the plant as values of the model. The file's own [model] takes precedence over its [plant].
-std::vector<FileValue> as_model(const std::vector<FileValue>& values) {
-  Settings defaults;
-  const KeyTable table(defaults);
-  const auto is_given = [&values](std::string_view name) {
-    return std::any_of(values.begin(), values.end(), [name](const FileValue& value) { return value.name == name; });
-  };
-  std::vector<FileValue> model;
-  for (const FileValue& value : values) {
-    if (const Key* key = model_key(table.keys(), value.name)) {
-      if (!is_given(key->name)) model.push_back({key->name, value.value, value.origin});
-      continue;
-    }
-    const bool known = find_key(table.keys(), value.name) != nullptr;
-    // A misspelled name goes on to KeyTable::set, which refuses it and names the nearest key.
-    if (!is_of_plant(value.name) || !known) model.push_back(value);
-    const auto* text = std::get_if<std::string>(&value.value);
-    if (is_of_plant(value.name) && value.name.ends_with("_profile") && text != nullptr && !text->empty()) {
-      throw ConfigError(
-          fmt::format("{}: {}: only a simulated plant can follow a profile; leave it out or use --backend sim",
-                      value.origin, value.name));
-    }
-  }
-  return model;
-}
-
 }  // namespace
 
 std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
@@ -115,17 +83,26 @@ void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
 void load_file(const fs::path& file, KeyTable& keys, Tables tables) { set_all(read_file(file, tables), keys); }
 
 std::vector<FileValue> read_model(const fs::path& file) {
-  const std::vector<FileValue> given = read_file(file, Tables::of_plant);
-  std::vector<FileValue> model;
-  if (names_plant(given)) {
-    Settings defaults;
-    const KeyTable table(defaults);
-    for (const Key& key : table.keys()) {
-      if (!key.name.starts_with("model.")) continue;
-      model.push_back({key.name, value_of(key), file.string()});
+  const auto is_of_plant = [](const FileValue& value) { return value.name.starts_with("plant."); };
+  std::vector<FileValue> given = read_file(file, Tables::of_plant);
+  if (std::ranges::none_of(given, is_of_plant)) return given;
+  Settings settings;
+  KeyTable table(settings);
+  for (const FileValue& value : given) {
+    const bool of_model = model_key(table.keys(), value.name) != nullptr;
+    // The table refuses a misspelled name, too.
+    if (of_model || !is_of_plant(value) || find_key(table.keys(), value.name) == nullptr) {
+      table.set(value.name, value.value, value.origin);
+    } else if (value.name.ends_with("_profile") && !text_of(value.value).empty()) {
+      throw ConfigError(
+          fmt::format("{}: {}: only a simulated plant can follow a profile; leave it out or use --backend sim",
+                      value.origin, value.name));
     }
   }
-  for (FileValue& value : as_model(given)) model.push_back(std::move(value));
+  std::vector<FileValue> model;
+  for (const Key& key : table.keys()) {
+    if (key.name.starts_with("model.")) model.push_back({key.name, value_of(key), file.string()});
+  }
   return model;
 }
 
