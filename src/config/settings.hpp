@@ -74,9 +74,9 @@ struct Settings {
 [[nodiscard]] std::uint64_t sensor_seed(const Settings& s);
 
 /// What the outputs of the settings' backend make of a command. Throws driver::Unavailable for an unknown board.
-[[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s) {
-  return s.backend == "rig" ? driver::output_grid(s.driver)
-                            : driver::simulated_output_grid(s.driver, s.plant.ideal_actuator);
+/// @param plant  the simulated rig; not used on a board
+[[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s, const plant_sim::PlantOptions& plant) {
+  return s.on_rig() ? driver::output_grid(s.driver) : driver::simulated_output_grid(s.driver, plant.ideal_actuator);
 }
 
 }  // namespace abs_hil::config

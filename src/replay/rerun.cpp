@@ -44,7 +44,7 @@ class RecordedRig final : public driver::RigDriver {
         ideal_sensors_(s.plant.ideal_sensors),
         injected_(!s.inject.empty()),
         loses_commands_(s.backend == "rig"),
-        grid_(config::output_grid(s)) {}
+        grid_(config::output_grid(s, s.plant)) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }

@@ -117,17 +117,12 @@ Prepared::Prepared(const config::Settings& s, config::Plan its_plan)
       period_ns(std::llround(1e9 / s.control.rate_Hz)),
       to_stop(config::means_to_stop(plan, s.experiment.end_speed_m_s)) {}
 
-driver::OutputGrid Prepared::grid(const plant_sim::PlantOptions& plant) const {
-  return settings.on_rig() ? driver::output_grid(settings.driver)
-                           : driver::simulated_output_grid(settings.driver, plant.ideal_actuator);
-}
-
 experiment::RunLogicParts Prepared::logic_parts(const plant_sim::PlantOptions& plant) const {
   const config::Settings& s = settings;
   experiment::RunLogicParts parts =
       experiment::make_logic_parts(s.control, s.model, s.on_rig() ? s.rig.parameters : plant_sim::identity_of(plant),
                                    s.plant.ideal_actuator, s.gate, s.experiment, plan.phases, plan.limits);
-  parts.duty_steps = grid(plant).duty_steps;
+  parts.duty_steps = config::output_grid(s, plant).duty_steps;
   return parts;
 }
 
