@@ -1,7 +1,6 @@
 // From what a person says, and the files that it names, to the effective configuration of one run.
 #pragma once
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
-#include <variant>
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
