@@ -43,11 +43,11 @@ struct Arguments {
 };
 
 void plain(cli::Parser& parser, const char* names, const cli::Target& to, const char* help) {
-  parser.add({.names = names, .to = to, .help = help});
+  parser.add(names, to, help);
 }
 /// The help shows its default.
 void shown(cli::Parser& parser, const char* names, const cli::Target& to, const char* help) {
-  parser.add({.names = names, .to = to, .help = help, .show_default = true});
+  parser.add(names, to, help, {.show_default = true});
 }
 
 void add_card_options(cli::Parser& parser, emulator::CardOptions& card) {
@@ -56,11 +56,8 @@ void add_card_options(cli::Parser& parser, emulator::CardOptions& card) {
   shown(parser, "--overspeed-rpm", &card.overspeed_rpm, "the FPGA's limit (our choice), rpm");
   shown(parser, "--supply-min", &card.supply_min_V, "the FPGA's limit (our choice), V");
   shown(parser, "--temperature-max", &card.temperature_max_C, "the FPGA's limit (our choice), deg C");
-  parser.add({.names = "--overspeed-bit",
-              .to = &card.overspeed_bit,
-              .help = "overspeed bit of the trip flags (the sources disagree)",
-              .one_of = {"0", "2"},
-              .show_default = true});
+  parser.add("--overspeed-bit", &card.overspeed_bit, "overspeed bit of the trip flags (the sources disagree)",
+             {.one_of = {"0", "2"}, .show_default = true});
   plain(parser, "--trip-clears-width", &card.trip_clears_width,
         "a trip also zeroes the PWM width registers (not known of the real card)");
 }
@@ -69,16 +66,12 @@ void add_usb_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
   shown(parser, "--usb-serial", &emulator.identity.serial, "serial number of the USB board");
   shown(parser, "--usb-manufacturer", &emulator.identity.manufacturer, "manufacturer string of the USB board");
   shown(parser, "--vhci", &emulator.controller, "folder of the virtual host controller");
-  parser.add({.names = "--hide-outputs",
-              .to = &emulator.usb.shows_outputs,
-              .help = "the USB board's frames do not show the sent words (not known of the real board)",
-              .sets = false});
+  parser.add("--hide-outputs", &emulator.usb.shows_outputs,
+             "the USB board's frames do not show the sent words (not known of the real board)", {.sets = false});
   plain(parser, "--enable-line", &emulator.usb.enable_line,
         "digital line of the USB board, or I/O of the 7I92T, that enables the drive");
-  parser.add({.names = "--when-braking",
-              .to = &emulator.when_braking,
-              .help = "control command of the USB board, obeyed once the brake has acted for 0.3 s",
-              .repeated = true});
+  parser.add("--when-braking", &emulator.when_braking,
+             "control command of the USB board, obeyed once the brake has acted for 0.3 s", {.repeated = true});
 }
 
 void add_hm2_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
@@ -86,81 +79,48 @@ void add_hm2_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
   plain(parser, "--board-name", &emulator.hm2.name,
         "name that the 7I92T or the node reports, for example 7I92 [7I92T, abs-node]");
   plain(parser, "--mac", &emulator.mac, "MAC address in the EEPROM of the 7I92T or the node: 00:60:1b:16:ab:50");
-  parser.add({.names = "--wrong-board",
-              .to = &emulator.hm2.lie,
-              .help = "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies()});
+  parser.add("--wrong-board", &emulator.hm2.lie, "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies());
   plain(parser, "--active-high", &emulator.hm2.active_high_stage,
         "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM");
 }
 
 void add_board_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
   cli::Parser board = parser.add_group("board", "the board of the rig", {.least = 1, .most = 1});
-  board.add({.names = "--pci-root",
-             .to = &emulator.pci_root,
-             .help = "emulate a card: folder at which to mount its tree; created if missing",
-             .type = "DIR"});
-  board.add({.names = "--can",
-             .to = &emulator.can_interface,
-             .help = "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on",
-             .type = "IFACE"});
-  board.add({.names = "--usb",
-             .to = &emulator.use_usb,
-             .help = "emulate a USB board, plugged into this computer's vhci_hcd (needs root)"});
-  board.add({.names = "--hm2",
-             .to = &emulator.hm2_address,
-             .help = "emulate a Mesa 7I92T: address at which it takes datagrams, with a port if it is not 27181",
-             .type = "ADDRESS[:PORT]"});
-  board.add({.names = "--node",
-             .to = &emulator.node_address,
-             .help = "emulate the node with the firmware of firmware/: address, as for --hm2",
-             .type = "ADDRESS[:PORT]"});
+  board.add("--pci-root", &emulator.pci_root, "emulate a card: folder at which to mount its tree; created if missing",
+            {.type = "DIR"});
+  board.add("--can", &emulator.can_interface, "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on",
+            {.type = "IFACE"});
+  board.add("--usb", &emulator.use_usb, "emulate a USB board, plugged into this computer's vhci_hcd (needs root)");
+  board.add("--hm2", &emulator.hm2_address,
+            "emulate a Mesa 7I92T: address at which it takes datagrams, with a port if it is not 27181",
+            {.type = "ADDRESS[:PORT]"});
+  board.add("--node", &emulator.node_address, "emulate the node with the firmware of firmware/: address, as for --hm2",
+            {.type = "ADDRESS[:PORT]"});
 }
 
 void add_options(cli::Parser& parser, Arguments& a) {
   add_board_options(parser, a.emulator);
-  parser.add({.names = "--watchdog-ms",
-              .to = &a.emulator.watchdog_ms,
-              .help = "watchdog of the CAN node, ms, until an activation sets another value",
-              .range = {1, 10'000},
-              .show_default = true});
-  shown(parser, "--bdf", &a.emulator.bdfs,
-        "the card's address; give it again for more cards, without a rig behind them");
+  parser.add("--watchdog-ms", &a.emulator.watchdog_ms, "watchdog of the CAN node, ms, until an activation sets another value",
+             {.range = {1, 10'000}, .show_default = true});
+  shown(parser, "--bdf", &a.emulator.bdfs, "the card's address; give it again for more cards, without a rig behind them");
   shown(parser, "--plant", &a.plant, "plant by name or TOML file");
-  parser.add({.names = "--set",
-              .to = &a.assignments,
-              .help = "any plant value, for example plant.theta_N=30",
-              .repeated = true});
+  parser.add("--set", &a.assignments, "any plant value, for example plant.theta_N=30", {.repeated = true});
   shown(parser, "--seed", &a.emulator.seed, "seed of intermittent faults and garbage");
   plain(parser, "--lock-step", &a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
-  parser.add({.names = "--fault",
-              .to = &a.faults,
-              .help = "fault of one register from the start, for example 88:stuck",
-              .repeated = true});
-  parser.add(
-      {.names = "--command", .to = &a.commands, .help = "any control command, obeyed at the start", .repeated = true});
+  parser.add("--fault", &a.faults, "fault of one register from the start, for example 88:stuck", {.repeated = true});
+  parser.add("--command", &a.commands, "any control command, obeyed at the start", {.repeated = true});
   plain(parser, "--control", &a.control_fifo, "FIFO from which to take commands while running; created if missing");
-  parser.add({.names = "--truth",
-              .to = &a.emulator.truth_file,
-              .help = "CSV of true values that no register or frame shows, every ms",
-              .excludes = {"--can"}});
-  parser.add({.names = "--record",
-              .to = &a.emulator.traffic_file,
-              .help = "log of every register access to the card, one per line",
-              .excludes = {"--can", "--usb", "--hm2", "--node"}});
+  parser.add("--truth", &a.emulator.truth_file, "CSV of true values that no register or frame shows, every ms",
+             {.excludes = {"--can"}});
+  parser.add("--record", &a.emulator.traffic_file, "log of every register access to the card, one per line",
+             {.excludes = {"--can", "--usb", "--hm2", "--node"}});
   shown(parser, "--vendor", &a.emulator.vendor, "vendor id of the card");
   shown(parser, "--device", &a.emulator.device, "device id of the card");
   shown(parser, "--bar-bytes", &a.emulator.bar_bytes, "size of BAR 2");
-  parser.add({.names = "--bar-kind",
-              .to = &a.emulator.bar_kind,
-              .help = "io or memory",
-              .one_of = {"io", "memory"},
-              .show_default = true});
+  parser.add("--bar-kind", &a.emulator.bar_kind, "io or memory", {.one_of = {"io", "memory"}, .show_default = true});
   plain(parser, "--cpu", &a.cpu, "CPU to run on; the client's CPU gives short accesses");
-  parser.add({.names = "--priority",
-              .to = &a.priority,
-              .help = "SCHED_FIFO priority, higher than the client's; 0: none",
-              .range = {0, 98},
-              .show_default = true});
+  parser.add("--priority", &a.priority, "SCHED_FIFO priority, higher than the client's; 0: none",
+             {.range = {0, 98}, .show_default = true});
   add_card_options(parser, a.emulator.card);
   add_usb_options(parser, a.emulator);
   add_hm2_options(parser, a.emulator);

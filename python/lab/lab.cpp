@@ -18,7 +18,6 @@
 #include "analysis/braking_figures.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
 #include "config/merge.hpp"
 #include "files.hpp"
 #include "rig/gate_counts.hpp"

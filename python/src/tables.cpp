@@ -12,7 +12,7 @@
 #include "bindings.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 
 namespace abs_hil::python {
 

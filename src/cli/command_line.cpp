@@ -20,17 +20,6 @@ namespace abs_hil::cli {
 
 namespace {
 
-CLI::Option* bind(CLI::App& app, const Option& row) {
-  const auto bind_to = [&app, &row](auto* to) {
-    if constexpr (std::is_same_v<decltype(to), bool*>) {
-      return app.add_flag((row.sets ? "" : "!") + row.names, *to, row.help);
-    } else {
-      return app.add_option(row.names, *to, row.help);
-    }
-  };
-  return std::visit(bind_to, row.to);
-}
-
 bool is_integer(const Target& target) {
   return std::visit([](auto* to) { return std::is_integral_v<std::remove_pointer_t<decltype(to)>>; }, target);
 }
@@ -42,14 +31,14 @@ std::string refuse_infinite(const std::string& text) {
                                                                          : std::string();
 }
 
-void limit_values(CLI::Option& option, const Option& row) {
-  if (std::holds_alternative<double*>(row.to)) option.check(refuse_infinite, "");
+void limit_values(CLI::Option& option, const Target& to, const Option& row) {
+  const bool real = std::holds_alternative<double*>(to);
+  if (real) option.check(refuse_infinite, "");
   const auto [least, most] = row.range;
   if (least < most) {
-    option.check(std::holds_alternative<double*>(row.to) ? CLI::Range(least, most)
-                                                         : CLI::Range(static_cast<int>(least), static_cast<int>(most)));
+    option.check(real ? CLI::Range(least, most) : CLI::Range(static_cast<int>(least), static_cast<int>(most)));
   }
-  if (!row.one_of.empty() && is_integer(row.to)) {
+  if (!row.one_of.empty() && is_integer(to)) {
     std::vector<int> numbers(row.one_of.size());
     std::ranges::transform(row.one_of, numbers.begin(), [](const std::string& text) { return std::stoi(text); });
     option.check(CLI::IsMember(numbers));
@@ -85,9 +74,16 @@ std::string unexpected(const CLI::App& program) {
 
 Parser::Parser(std::string name, const std::string& help) : app_(std::make_shared<CLI::App>(help, std::move(name))) {}
 
-void Parser::add(const Option& row) {
-  CLI::Option& option = *bind(*app_, row);
-  limit_values(option, row);
+void Parser::add(const std::string& names, const Target& to, const std::string& help, const Option& row) {
+  const auto bind = [&](auto* target) {
+    if constexpr (std::is_same_v<decltype(target), bool*>) {
+      return app_->add_flag((row.sets ? "" : "!") + names, *target, help);
+    } else {
+      return app_->add_option(names, *target, help);
+    }
+  };
+  CLI::Option& option = *std::visit(bind, to);
+  limit_values(option, to, row);
   if (!row.type.empty()) option.type_name(row.type);
   if (row.count.most > 0) option.expected(row.count.least, row.count.most);
   if (row.repeated) option.allow_extra_args(false);

@@ -16,7 +16,7 @@ class App;
 // Options and subcommands of a program, one row each:
 //
 //   cli::Parser parser("abs_hil", "Drives the rig");
-//   parser.add({.names = "--backend", .to = &o.backend, .help = "sim or rig", .one_of = {"sim", "rig"}});
+//   parser.add("--backend", &o.backend, "sim or rig", {.one_of = {"sim", "rig"}});
 //   if (const auto status = parser.parse(argc, argv)) return *status;
 //
 // Only command_line.cpp includes the library behind it, CLI11, which takes long to compile.
@@ -41,22 +41,19 @@ struct Count {
   int most{0};
 };
 
-/// One option. Its first three fields have no default, and gcc warns if one is missing.
+/// What more there is to say of an option.
 struct Option {
-  std::string names;  ///< "--rate" or "-r,--rate"; without dashes, an argument known by its place
-  Target to;          ///< a bool makes the option a flag, which takes no value
-  std::string help;
-  bool sets{true};                      ///< the value that a flag gives its target
-  std::string type{};                   ///< name of the value in the help; empty: that of its type
-  Range range{};                        ///< of integers unless the target is a double
-  std::vector<std::string> one_of{};    ///< valid values; empty: any
-  Count count{};                        ///< of values
-  bool repeated{false};                 ///< takes one value each time; without it, all that follow
-  bool required{false};                 ///< the command line must have it
-  bool show_default{false};             ///< the help shows the target's value at this moment
-  std::string default_text{};           ///< the help shows this as the default
-  std::vector<std::string> needs{};     ///< names of options that must be given with it
-  std::vector<std::string> excludes{};  ///< names of options that must not
+  bool sets{true};                                   ///< the value that a flag gives its target
+  std::string type{};                                ///< name of the value in the help; empty: that of its type
+  Range range{};                                     ///< of integers unless the target is a double
+  std::vector<std::string> one_of{};                 ///< valid values; empty: any
+  Count count{};                                     ///< of values
+  bool repeated{false};                              ///< takes one value each time; without it, all that follow
+  bool required{false};                              ///< the command line must have it
+  bool show_default{false};                          ///< the help shows the target's value at this moment
+  std::string default_text{};                        ///< the help shows this as the default
+  std::vector<std::string> needs{};                  ///< names of options that must be given with it
+  std::vector<std::string> excludes{};               ///< names of options that must not
 };
 
 /// What a program, a subcommand or a group of options reads from a command line. A copy is the same parser.
@@ -68,7 +65,9 @@ class Parser {
   Parser(std::string name, const std::string& help);
 
   /// Adds an option. Those that it needs or excludes come first. Throws std::exception for an invalid row.
-  void add(const Option& row);
+  /// @param names  "--rate" or "-r,--rate"; without dashes, an argument known by its place
+  /// @param to  a bool makes the option a flag, which takes no value
+  void add(const std::string& names, const Target& to, const std::string& help, const Option& row = {});
   /// Adds --version, which prints this text.
   void set_version(const std::string& version);
   /// Sets the last lines of the help.

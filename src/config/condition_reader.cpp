@@ -24,7 +24,7 @@ std::vector<ConditionScript> read_list(const TableReader& reader, const Entry& e
 ConditionScript read_condition(const TableReader& reader, Depth depth) {
   ConditionScript condition;
   condition.place = reader.place();
-  if (const Entry* when = reader.find("when")) condition.when = reader.when(*when);
+  if (const Entry* when = reader.find("when")) condition.when = reader.get<When>(*when);
   const Entry* what = nullptr;
   for (const Entry& entry : reader.entries()) {
     if (entry.key == "when") continue;
@@ -44,9 +44,9 @@ ConditionScript read_condition(const TableReader& reader, Depth depth) {
   if (const experiment::EndRow* row = row_with(what->field->facts.key)) {
     condition.kind = static_cast<EndKind>(row - experiment::end_rows.data());
     if (row->takes_value()) {
-      condition.value = reader.number(*what);
+      reader.read(*what, condition.value);
     } else {
-      reader.flag(*what);
+      static_cast<void>(reader.get<bool>(*what));
     }
     return condition;
   }
@@ -94,23 +94,24 @@ const Grammar& ConditionScript::grammar() {
   return grammar;
 }
 
-std::vector<ConditionScript> TableReader::conditions(const Entry& entry) const {
+void TableReader::read(const Entry& entry, std::vector<ConditionScript>& conditions) const {
   const TableReader reader(source_, table(entry), grammar_of<ConditionScript>(), entry.place);
   if (const Entry* any = reader.find("any"); any != nullptr && reader.entries().size() == 1) {
-    return read_list(reader, *any, Depth::any);
+    conditions = read_list(reader, *any, Depth::any);
+  } else {
+    conditions = {read_condition(reader, Depth::until)};
   }
-  return {read_condition(reader, Depth::until)};
 }
 
-When TableReader::when(const Entry& entry) const {
-  const std::string all = text(entry);
+void TableReader::read(const Entry& entry, When& when) const {
+  const auto all = get<std::string>(entry);
   // Two-character operations first: "<" is the beginning of "<=".
   for (const std::string_view operation : {"!=", "<=", ">=", "=", "<", ">"}) {
     const std::size_t found = all.find(operation);
     if (found == std::string::npos) continue;
     const std::string_view view = all;
-    When when{std::string(rig::trimmed(view.substr(0, found))), std::string(operation),
-              std::string(rig::trimmed(view.substr(found + operation.size()))), entry.place};
+    when = {std::string(rig::trimmed(view.substr(0, found))), std::string(operation),
+            std::string(rig::trimmed(view.substr(found + operation.size()))), entry.place};
     const Key& key = source_.key(when.key, entry.place);
     source_.check_value(when.key, parse_value(key, when.value), entry.place);
     const bool ordered =
@@ -118,7 +119,7 @@ When TableReader::when(const Entry& entry) const {
     if (!ordered && operation != "=" && operation != "!=") {
       fail(entry.place, fmt::format("when = \"{}\": {} is no number; compare it with = or !=", all, when.key));
     }
-    return when;
+    return;
   }
   fail(entry.place, fmt::format("when = \"{}\": give a comparison, \"KEY = VALUE\", with one of = != < > <= >=", all));
 }

@@ -3,7 +3,6 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,6 +11,7 @@
 #include <fstream>
 
 #include "config/config_error.hpp"
+#include "config/reader.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 
@@ -43,59 +43,21 @@ bool is_table(const std::string& name) {
   return std::ranges::any_of(keys.keys(), [&](const Key& key) { return key.name.starts_with(name + '.'); });
 }
 
-void collect(const toml::table& table, const std::string& prefix, const fs::path& file,
-             std::vector<FileValue>& values) {
-  for (const auto& [key, node] : table) {
-    const std::string name = prefix.empty() ? std::string(key.str()) : prefix + '.' + std::string(key.str());
+std::vector<FileValue> values_of(const toml::table& table, const fs::path& file) {
+  std::vector<FileValue> values;
+  const auto is_empty = [](const toml::table& inner) { return inner.empty(); };
+  for_each_value(table, {}, is_empty, [&](const std::string& name, Place, const toml::node& node) {
     const std::string origin = fmt::format("{}:{}", file.string(), node.source().begin.line);
-    if (const auto* inner = node.as_table()) {
-      collect(*inner, name, file, values);
+    if (node.is_table()) {
       // An empty table sets nothing, so that no key's check would notice a misspelled name.
-      if (inner->empty() && !is_table(name)) values.push_back({name, std::string(), origin});
-    } else if (const auto* text = node.as_string()) {
-      values.push_back({name, text->get(), origin});
-    } else if (const auto* flag = node.as_boolean()) {
-      values.push_back({name, flag->get(), origin});
-    } else if (const auto* integer = node.as_integer()) {
-      values.push_back({name, integer->get(), origin});
-    } else if (const auto* real = node.as_floating_point()) {
-      values.push_back({name, real->get(), origin});
+      if (!is_table(name)) values.push_back({name, std::string(), origin});
+    } else if (const std::optional<Value> value = value_in(node)) {
+      values.push_back({name, *value, origin});
     } else {
       throw ConfigError(fmt::format("{}: {} is neither a number, a flag nor a text; give one of them", origin, name));
     }
-  }
-}
-
-bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
-
-bool names_plant(const std::vector<FileValue>& values) {
-  return std::any_of(values.begin(), values.end(), [](const FileValue& value) { return is_of_plant(value.name); });
-}
-
-/// Values of the plant as values of the model. The file's own [model] takes precedence over its [plant].
-std::vector<FileValue> as_model(const std::vector<FileValue>& values) {
-  Settings defaults;
-  const KeyTable table(defaults);
-  const auto is_given = [&values](std::string_view name) {
-    return std::any_of(values.begin(), values.end(), [name](const FileValue& value) { return value.name == name; });
-  };
-  std::vector<FileValue> model;
-  for (const FileValue& value : values) {
-    if (const Key* key = model_key(table.keys(), value.name)) {
-      if (!is_given(key->name)) model.push_back({key->name, value.value, value.origin});
-      continue;
-    }
-    const bool known = find_key(table.keys(), value.name) != nullptr;
-    // A misspelled name goes on to KeyTable::set, which refuses it and names the nearest key.
-    if (!is_of_plant(value.name) || !known) model.push_back(value);
-    const auto* text = std::get_if<std::string>(&value.value);
-    if (is_of_plant(value.name) && value.name.ends_with("_profile") && text != nullptr && !text->empty()) {
-      throw ConfigError(
-          fmt::format("{}: {}: only a simulated plant can follow a profile; leave it out or use --backend sim",
-                      value.origin, value.name));
-    }
-  }
-  return model;
+  });
+  return values;
 }
 
 }  // namespace
@@ -111,9 +73,7 @@ std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
                                     file.string(), node.source().begin.line, std::string_view(key.str())));
     }
   }
-  std::vector<FileValue> values;
-  collect(table, {}, file, values);
-  return values;
+  return values_of(table, file);
 }
 
 void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
@@ -123,18 +83,26 @@ void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
 void load_file(const fs::path& file, KeyTable& keys, Tables tables) { set_all(read_file(file, tables), keys); }
 
 std::vector<FileValue> read_model(const fs::path& file) {
-  const std::vector<FileValue> given = read_file(file, Tables::of_plant);
-  std::vector<FileValue> model;
-  if (names_plant(given)) {
-    Settings defaults;
-    const KeyTable table(defaults);
-    for (const Key& key : table.keys()) {
-      if (!key.name.starts_with("model.")) continue;
-      model.push_back(
-          {key.name, std::visit([](const auto* value) { return Value(*value); }, key.target), file.string()});
+  const auto is_of_plant = [](const FileValue& value) { return value.name.starts_with("plant."); };
+  std::vector<FileValue> given = read_file(file, Tables::of_plant);
+  if (std::ranges::none_of(given, is_of_plant)) return given;
+  Settings settings;
+  KeyTable table(settings);
+  for (const FileValue& value : given) {
+    const bool of_model = model_key(table.keys(), value.name) != nullptr;
+    // The table refuses a misspelled name, too.
+    if (of_model || !is_of_plant(value) || find_key(table.keys(), value.name) == nullptr) {
+      table.set(value.name, value.value, value.origin);
+    } else if (value.name.ends_with("_profile") && !text_of(value.value).empty()) {
+      throw ConfigError(
+          fmt::format("{}: {}: only a simulated plant can follow a profile; leave it out or use --backend sim",
+                      value.origin, value.name));
     }
   }
-  for (FileValue& value : as_model(given)) model.push_back(std::move(value));
+  std::vector<FileValue> model;
+  for (const Key& key : table.keys()) {
+    if (key.name.starts_with("model.")) model.push_back({key.name, value_of(key), file.string()});
+  }
   return model;
 }
 
@@ -149,6 +117,8 @@ fs::path first_folder(const std::vector<fs::path>& places) {
   throw ConfigError(fmt::format("no configuration folder at {}; set ABS_HIL_CONFIG_DIR to the project's config/",
                                 places.back().string()));
 }
+
+fs::path plants_dir() { return config_dir() / "plants"; }
 
 fs::path& given_own_config_dir() {
   static fs::path folder;
@@ -175,17 +145,29 @@ fs::path config_dir() {
   return given != nullptr ? first_folder({given}) : own_config_dir();
 }
 
-fs::path plant_file(std::string_view name_or_file, std::string_view option) {
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+fs::path named_file(fs::path (*folder)(), std::string_view what, std::string_view name_or_file,
+                    std::string_view option) {
   fs::path given(name_or_file);
   if (given.has_parent_path() || given.extension() == ".toml") return given;
-  fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
+  fs::path named = folder() / fmt::format("{}.toml", name_or_file);
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
-  std::vector<std::string_view> names;
-  const std::vector<PlantEntry> known = known_plants();
-  names.reserve(known.size());
-  for (const PlantEntry& plant : known) names.push_back(plant.name);
-  throw ConfigError(fmt::format("{}: unknown plant \"{}\"{}; known: {}; or give a TOML file", option, name_or_file,
-                                rig::nearest_hint(name_or_file, names), fmt::join(names, ", ")));
+  const std::vector<std::string> known = names_in(folder());
+  throw ConfigError(fmt::format("{}: unknown {} \"{}\"{}; known: {}; or give a TOML file", option, what, name_or_file,
+                                rig::nearest_hint(name_or_file, known), fmt::join(known, ", ")));
+}
+
+fs::path plant_file(std::string_view name_or_file, std::string_view option) {
+  return named_file(&plants_dir, "plant", name_or_file, option);
 }
 
 std::string model_origin(const Settings& settings, std::chrono::sys_days today) {
@@ -201,11 +183,9 @@ std::string model_origin(const Settings& settings, std::chrono::sys_days today) 
 
 std::vector<PlantEntry> known_plants() {
   std::vector<PlantEntry> plants;
-  for (const auto& entry : fs::directory_iterator(config_dir() / "plants")) {
-    if (entry.path().extension() != ".toml") continue;
-    plants.push_back({entry.path().stem().string(), parse(entry.path())["description"].value_or(std::string())});
+  for (const std::string& name : names_in(plants_dir())) {
+    plants.push_back({name, parse(plant_file(name))["description"].value_or(std::string())});
   }
-  std::sort(plants.begin(), plants.end(), [](const PlantEntry& a, const PlantEntry& b) { return a.name < b.name; });
   return plants;
 }
 

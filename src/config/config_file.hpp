@@ -47,6 +47,15 @@ void load_file(const std::filesystem::path& file, KeyTable& table, Tables tables
 /// Not thread-safe: call it before any other function of this file.
 void set_own_config_dir(std::filesystem::path folder);
 
+/// The names of the TOML files in a folder, sorted.
+[[nodiscard]] std::vector<std::string> names_in(const std::filesystem::path& folder);
+
+/// A TOML file: itself if it is a path or ends in .toml, else that of the name in the folder. Throws ConfigError,
+/// naming `option` and the known ones.
+/// @param what  "plant"
+[[nodiscard]] std::filesystem::path named_file(std::filesystem::path (*folder)(), std::string_view what,
+                                               std::string_view name_or_file, std::string_view option);
+
 /// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming `option` and the
 /// known plants.
 [[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file, std::string_view option = "--plant");

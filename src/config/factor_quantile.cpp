@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 
-#include "config/factors.hpp"
+#include "config/script.hpp"
 
 namespace abs_hil::config {
 

@@ -3,8 +3,6 @@
 // A factor's value at the probability u is F^-1(u): from + u (to - from) for a uniform range, from (to / from)^u for a
 // logarithmic one, and for a normal range cut off at least and most the quantile of the normal distribution at
 // F(least) + u (F(most) - F(least)).
-#include "config/factors.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -59,75 +57,80 @@ struct RangeForm {
   }
 };
 
+[[noreturn]] void refuse_range(const Source& source, const Key& key, const RangeForm& form, std::string_view why) {
+  source.fail(form.place, fmt::format("{}: {}", key.name, why));
+}
+
+double end_of(const Source& source, const Key& key, const RangeForm& form, const std::optional<double>& value,
+              std::string_view name) {
+  if (!value) {
+    refuse_range(
+        source, key, form,
+        fmt::format("the range has no {}; give {{ from, to }}, {{ from, to, steps }} or {{ mean, sd }}", name));
+  }
+  return *value;
+}
+
+Uniform uniform_of(const Source& source, const Key& key, const RangeForm& form) {
+  const Uniform range{end_of(source, key, form, form.from, "from"), end_of(source, key, form, form.to, "to"),
+                      form.scale == "log"};
+  if (range.from == range.to) {
+    refuse_range(source, key, form, fmt::format("both ends are {}; give two ends or a list", range.to));
+  }
+  if (range.logarithmic && !(range.from > 0.0 && range.to > 0.0)) {
+    refuse_range(source, key, form,
+                 fmt::format("a logarithmic range needs ends above 0; it has {} and {}", range.from, range.to));
+  }
+  for (const double value : {range.from, range.to}) source.check_value(key.name, value, form.place);
+  return range;
+}
+
+Levels steps_of(const Source& source, const Key& key, const RangeForm& form) {
+  const Uniform range = uniform_of(source, key, form);
+  Levels levels;
+  for (std::int64_t i = 0; i < form.steps; ++i) {
+    const double part = static_cast<double>(i) / static_cast<double>(form.steps - 1);
+    levels.values.emplace_back(i + 1 == form.steps ? range.to : at(range, part));
+    source.check_value(key.name, levels.values.back(), form.place);
+  }
+  return levels;
+}
+
+Normal normal_of(const Source& source, const Key& key, const RangeForm& form) {
+  // Without ends of its own, the range ends where the key's does. An open end is not reached.
+  const auto inside = [](double value, double other, bool open) { return open ? std::nextafter(value, other) : value; };
+  const rig::Range& valid = key.range;
+  const Normal normal{.mean = end_of(source, key, form, form.mean, "mean"),
+                      .sd = end_of(source, key, form, form.sd, "sd"),
+                      .least = form.least.value_or(inside(valid.least, valid.most, valid.least_open)),
+                      .most = form.most.value_or(inside(valid.most, valid.least, valid.most_open))};
+  for (const double value : {normal.least, normal.most}) source.check_value(key.name, value, form.place);
+  constexpr double far = 6.0;  // beyond it the part that remains has next to no probability
+  if (!(normal.least < normal.most) || normal.mean + far * normal.sd < normal.least ||
+      normal.mean - far * normal.sd > normal.most) {
+    refuse_range(
+        source, key, form,
+        fmt::format("nothing of the normal range lies in [{}, {}]; give a mean nearer to it, or least below most",
+                    normal.least, normal.most));
+  }
+  return normal;
+}
+
 /// The values of one factor, from its range.
-class RangeValues {
- public:
-  RangeValues(const Source& source, const Key& key, const RangeForm& form) : source_(source), key_(key), form_(form) {}
-
-  [[nodiscard]] std::variant<Levels, Uniform, Normal> values() const {
-    if (form_.steps > 0) return steps();
-    if (!std::holds_alternative<double*>(key_.target)) fail("only a real number has a range; give a list of values");
-    if (form_.normal()) return normal();
-    return uniform();
+std::variant<Levels, Uniform, Normal> values_of(const Source& source, const Key& key, const RangeForm& form) {
+  if (form.steps > 0) return steps_of(source, key, form);
+  if (!std::holds_alternative<double*>(key.target)) {
+    refuse_range(source, key, form, "only a real number has a range; give a list of values");
   }
+  if (form.normal()) return normal_of(source, key, form);
+  return uniform_of(source, key, form);
+}
 
- private:
-  [[noreturn]] void fail(std::string_view why) const {
-    source_.fail(form_.place, fmt::format("{}: {}", key_.name, why));
-  }
-
-  [[nodiscard]] double end(const std::optional<double>& value, std::string_view name) const {
-    if (!value) {
-      fail(fmt::format("the range has no {}; give {{ from, to }}, {{ from, to, steps }} or {{ mean, sd }}", name));
-    }
-    return *value;
-  }
-
-  [[nodiscard]] Uniform uniform() const {
-    const Uniform range{end(form_.from, "from"), end(form_.to, "to"), form_.scale == "log"};
-    if (range.from == range.to) fail(fmt::format("both ends are {}; give two ends or a list", range.to));
-    if (range.logarithmic && !(range.from > 0.0 && range.to > 0.0)) {
-      fail(fmt::format("a logarithmic range needs ends above 0; it has {} and {}", range.from, range.to));
-    }
-    for (const double value : {range.from, range.to}) source_.check_value(key_.name, value, form_.place);
-    return range;
-  }
-
-  [[nodiscard]] Levels steps() const {
-    const Uniform range = uniform();
-    Levels levels;
-    for (std::int64_t i = 0; i < form_.steps; ++i) {
-      const double part = static_cast<double>(i) / static_cast<double>(form_.steps - 1);
-      levels.values.emplace_back(i + 1 == form_.steps ? range.to : at(range, part));
-      source_.check_value(key_.name, levels.values.back(), form_.place);
-    }
-    return levels;
-  }
-
-  [[nodiscard]] Normal normal() const {
-    // Without ends of its own, the range ends where the key's does. An open end is not reached.
-    const auto inside = [](double value, double other, bool open) {
-      return open ? std::nextafter(value, other) : value;
-    };
-    const rig::Range& valid = key_.range;
-    const Normal normal{.mean = end(form_.mean, "mean"),
-                        .sd = end(form_.sd, "sd"),
-                        .least = form_.least.value_or(inside(valid.least, valid.most, valid.least_open)),
-                        .most = form_.most.value_or(inside(valid.most, valid.least, valid.most_open))};
-    for (const double value : {normal.least, normal.most}) source_.check_value(key_.name, value, form_.place);
-    constexpr double far = 6.0;  // beyond it the part that remains has next to no probability
-    if (!(normal.least < normal.most) || normal.mean + far * normal.sd < normal.least ||
-        normal.mean - far * normal.sd > normal.most) {
-      fail(fmt::format("nothing of the normal range lies in [{}, {}]; give a mean nearer to it, or least below most",
-                       normal.least, normal.most));
-    }
-    return normal;
-  }
-
-  const Source& source_;
-  const Key& key_;
-  const RangeForm& form_;
-};
+Value read_value(const Source& source, std::string_view key, const toml::node& node) {
+  if (std::optional<Value> value = value_in(node)) return std::move(*value);
+  source.fail(place_of(node.source()),
+              fmt::format("{} = {} is neither a number, a flag nor a text; give one of them", key, shown(node)));
+}
 
 Levels read_levels(const Source& source, const std::string& key, const toml::node& node) {
   Levels levels;
@@ -145,29 +148,10 @@ Levels read_levels(const Source& source, const std::string& key, const toml::nod
   return levels;
 }
 
-/// Calls `visit(dotted name, place of the name, node)` for each value below a table of configuration keys. A table
-/// for which `is_value` is true is a value.
-template <class IsValue, class Visit>
-void for_each_value(const toml::table& table, const std::string& prefix, const IsValue& is_value, const Visit& visit) {
-  for (const auto& [name, node] : table) {
-    const std::string key = prefix.empty() ? std::string(name.str()) : fmt::format("{}.{}", prefix, name.str());
-    const auto* inner = node.as_table();
-    if (inner != nullptr && !is_value(*inner)) {
-      for_each_value(*inner, key, is_value, visit);
-    } else {
-      visit(key, place_of(name.source()), node);
-    }
-  }
-}
-
 }  // namespace
 
 bool script_may_set(std::string_view key) noexcept {
   return std::ranges::none_of(not_for_scripts, [key](std::string_view start) { return key.starts_with(start); });
-}
-
-std::string text_of(const Value& value) {
-  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
 }
 
 double at(const Uniform& range, double u) noexcept {
@@ -176,17 +160,7 @@ double at(const Uniform& range, double u) noexcept {
   return std::clamp(value, std::min(range.from, range.to), std::max(range.from, range.to));
 }
 
-Value read_value(const Source& source, std::string_view key, const toml::node& node) {
-  if (const auto* text = node.as_string()) return text->get();
-  if (const auto* flag = node.as_boolean()) return flag->get();
-  if (const auto* integer = node.as_integer()) return integer->get();
-  if (const auto* real = node.as_floating_point()) return real->get();
-  source.fail(place_of(node.source()),
-              fmt::format("{} = {} is neither a number, a flag nor a text; give one of them", key, shown(node)));
-}
-
-std::vector<Setting> TableReader::settings(const Entry& entry) const {
-  std::vector<Setting> settings;
+void TableReader::read(const Entry& entry, std::vector<Setting>& settings) const {
   const auto never = [](const toml::table&) { return false; };
   for_each_value(table(entry), {}, never, [&](const std::string& key, Place place, const toml::node& node) {
     static_cast<void>(source_.key(key, place));
@@ -196,18 +170,16 @@ std::vector<Setting> TableReader::settings(const Entry& entry) const {
     settings.push_back({key, read_value(source_, key, node), place_of(node.source())});
     source_.check_value(key, settings.back().value, settings.back().place);
   });
-  return settings;
 }
 
-std::vector<Factor> TableReader::factors(const Entry& entry) const {
-  std::vector<Factor> factors;
+void TableReader::read(const Entry& entry, std::vector<Factor>& factors) const {
   for_each_value(table(entry), {}, is_range, [&](const std::string& name, Place place, const toml::node& node) {
     const Key& key = source_.key(name, place);
     Factor factor{.key = name, .place = place};
     if (const auto* range = node.as_table()) {
       RangeForm form;
       read_table(source_, *range, place_of(node.source()), form);
-      factor.values = RangeValues(source_, key, form).values();
+      factor.values = values_of(source_, key, form);
     } else {
       factor.values = read_levels(source_, name, node);
     }
@@ -216,7 +188,6 @@ std::vector<Factor> TableReader::factors(const Entry& entry) const {
   // The file's order numbers the runs. toml++ does not keep it.
   std::ranges::sort(factors, {},
                     [](const Factor& factor) { return std::pair(factor.place.line, factor.place.column); });
-  return factors;
 }
 
 }  // namespace abs_hil::config

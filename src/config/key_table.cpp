@@ -1,11 +1,10 @@
-// Values of the configuration by their dotted names: setting with checks, printing as TOML and JSON.
+// Values of the configuration by their dotted names: setting with checks, printing as TOML, to and from JSON.
 #include "config/key_table.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <type_traits>
@@ -15,21 +14,15 @@
 #include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
+#include "rig/parse_json.hpp"
 
 namespace abs_hil::config {
 
 namespace {
 
-std::string value_text(const Value& value) {
-  return std::visit(
-      [](const auto& v) -> std::string {
-        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
-          return '"' + v + '"';
-        } else {
-          return fmt::format("{}", v);
-        }
-      },
-      value);
+/// The value as it was given, for messages.
+std::string as_given(const Value& value) {
+  return std::holds_alternative<std::string>(value) ? '"' + text_of(value) + '"' : text_of(value);
 }
 
 [[noreturn]] void refuse(const Key& key, std::string_view value, std::string_view valid, std::string_view origin) {
@@ -46,40 +39,22 @@ std::string nearest_of(const Key& key, const std::string* text) {
 template <typename Number>
 void assign_number(const Key& key, Number& target, const Value& value, std::string_view origin) {
   constexpr bool whole = std::is_integral_v<Number>;
-  const std::string valid = rig::valid_number_text(key, whole);
-  double number = 0.0;
-  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-    number = static_cast<double>(*integer);
-  } else if (const auto* real = std::get_if<double>(&value)) {
-    number = *real;
-  } else {
-    refuse(key, value_text(value), valid, origin);
+  const std::optional<double> number = number_of(value);
+  if (!number || !key.range.contains(*number) || (whole && *number != std::floor(*number))) {
+    refuse(key, as_given(value), rig::valid_number_text(key, whole), origin);
   }
-  if (!key.range.contains(number) || (whole && number != std::floor(number)))
-    refuse(key, value_text(value), valid, origin);
-  target = static_cast<Number>(number);
+  target = static_cast<Number>(*number);
 }
 
 /// Reads a value as TOML would: a flag, a whole number or a number, otherwise text.
 Value parse_value(std::string_view text) {
   if (text == "true" || text == "false") return text == "true";
-  const char* end = text.data() + text.size();
-  const bool is_hex = text.starts_with("0x") || text.starts_with("0X");
-  std::int64_t integer = 0;
-  if (is_hex) {
-    const auto [at, error] = std::from_chars(text.data() + 2, end, integer, 16);
-    if (error == std::errc() && at == end) return integer;
+  if (text.starts_with("0x") || text.starts_with("0X")) {
+    if (const auto hexadecimal = rig::parse_number<std::int64_t>(text.substr(2), 16)) return *hexadecimal;
   }
-  if (const auto [at, error] = std::from_chars(text.data(), end, integer); error == std::errc() && at == end) {
-    return integer;
-  }
-  double real = 0.0;
-  if (const auto [at, error] = std::from_chars(text.data(), end, real); error == std::errc() && at == end) return real;
+  if (const auto integer = rig::parse_number<std::int64_t>(text)) return *integer;
+  if (const auto real = rig::parse_number<double>(text)) return *real;
   return std::string(text);
-}
-
-nlohmann::ordered_json value_of(const Key& key) {
-  return std::visit([](const auto* target) { return nlohmann::ordered_json(*target); }, key.target);
 }
 
 void copy(const Key& from, const Key& to) {
@@ -114,8 +89,27 @@ const Key* model_key(const std::vector<Key>& keys, std::string_view name) {
   return find_key(keys, std::string(model_prefix).append(name.substr(plant_prefix.size())));
 }
 
-std::string value_text(const Key& key) {
-  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key.target);
+Value value_of(const Key& key) {
+  return std::visit([](const auto* target) { return Value(*target); }, key.target);
+}
+
+std::optional<double> number_of(const Value& value) {
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return static_cast<double>(*integer);
+  const auto* real = std::get_if<double>(&value);
+  return real == nullptr ? std::nullopt : std::optional(*real);
+}
+
+std::string text_of(const Value& value) {
+  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+nlohmann::ordered_json json_of(const Value& value) {
+  return std::visit([](const auto& v) { return nlohmann::ordered_json(v); }, value);
+}
+
+std::string toml_of(const Value& value) {
+  // A number gets the shortest form that reads back to the same value. TOML reads a text as JSON writes it.
+  return std::holds_alternative<std::string>(value) ? json_of(value).dump() : text_of(value);
 }
 
 rig::SafetyClass safety_of(const Key& key) {
@@ -135,7 +129,7 @@ std::vector<runtime::WeakValue> weak_values(const KeyTable& keys) {
   for (const Key& key : keys.keys()) {
     if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
     weak.push_back({.key = key.name,
-                    .value = value_text(key),
+                    .value = text_of(value_of(key)),
                     .class_text = key.safety.in_words(key.unit),
                     .consent = std::string(key.safety.consent),
                     .meaning = std::string(key.meaning)});
@@ -147,8 +141,7 @@ std::string number_text(const Settings& settings, std::string_view name) {
   Settings copy = settings;
   const KeyTable keys(copy);
   const Key* key = find_key(keys.keys(), name);
-  if (key == nullptr || std::holds_alternative<std::string*>(key->target)) return {};
-  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key->target);
+  return key == nullptr || std::holds_alternative<std::string*>(key->target) ? std::string() : text_of(value_of(*key));
 }
 
 Value parse_value(const Key& key, std::string_view text) {
@@ -204,12 +197,12 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
         using Target = std::decay_t<decltype(*target)>;
         if constexpr (std::is_same_v<Target, bool>) {
           const auto* flag = std::get_if<bool>(&value);
-          if (flag == nullptr) refuse(key, value_text(value), "true or false", origin);
+          if (flag == nullptr) refuse(key, as_given(value), "true or false", origin);
           *target = *flag;
         } else if constexpr (std::is_same_v<Target, std::string>) {
           const auto* text = std::get_if<std::string>(&value);
           if (text == nullptr || !key.allows(*text)) {
-            refuse(key, value_text(value), rig::valid_name_text(key) + nearest_of(key, text), origin);
+            refuse(key, as_given(value), rig::valid_name_text(key) + nearest_of(key, text), origin);
           }
           if (!rig::is_utf8(*text)) {
             throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
@@ -224,18 +217,19 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
   carry_over(key);
 }
 
-std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment, std::string_view origin) {
+std::pair<std::string, Value> KeyTable::parsed(std::string_view assignment, std::string_view origin) const {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos || equals == 0) {
     throw ConfigError(
         fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
   }
-  return {rig::trimmed(assignment.substr(0, equals)), rig::trimmed(assignment.substr(equals + 1))};
+  const std::string_view name = rig::trimmed(assignment.substr(0, equals));
+  return {std::string(name), parse_value(find(name, origin), rig::trimmed(assignment.substr(equals + 1)))};
 }
 
 void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
-  const auto [name, text] = split_assignment(assignment, origin);
-  set(name, parse_value(find(name, origin), text), origin);
+  const auto [name, value] = parsed(assignment, origin);
+  set(name, value, origin);
 }
 
 std::string KeyTable::to_toml() const {
@@ -247,17 +241,7 @@ std::string KeyTable::to_toml() const {
     const std::string_view table = std::string_view(key.name).substr(0, dot);
     auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
     if (at == tables.end()) at = tables.insert(tables.end(), {table, fmt::format("\n[{}]\n", table)});
-    // A number gets the shortest form that reads back to the same value. TOML reads a text as JSON writes it.
-    const std::string value = std::visit(
-        [](const auto* target) {
-          if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>) {
-            return nlohmann::json(*target).dump();
-          } else {
-            return fmt::format("{}", *target);
-          }
-        },
-        key.target);
-    at->second += fmt::format("{} = {}\n", key.name.substr(dot + 1), value);
+    at->second += fmt::format("{} = {}\n", key.name.substr(dot + 1), toml_of(value_of(key)));
   }
   std::string text;
   for (const auto& [name, values] : tables) text += values;
@@ -274,9 +258,53 @@ nlohmann::ordered_json KeyTable::to_json() const {
       node = &(*node)[std::string(rest.substr(0, dot))];
       rest.remove_prefix(dot + 1);
     }
-    (*node)[std::string(rest)] = value_of(key);
+    (*node)[std::string(rest)] = json_of(value_of(key));
   }
   return root;
+}
+
+namespace {
+
+void set_values(const nlohmann::ordered_json& node, const std::string& name, KeyTable& table, std::string_view origin,
+                std::vector<std::string>& unknown) {
+  if (node.is_object()) {
+    for (const auto& [key, value] : node.items()) {
+      set_values(value, name.empty() ? key : fmt::format("{}.{}", name, key), table, origin, unknown);
+    }
+    return;
+  }
+  if (find_key(table.keys(), name) == nullptr) {
+    unknown.push_back(name);
+  } else if (node.is_boolean()) {
+    table.set(name, node.get<bool>(), origin);
+  } else if (node.is_number_integer()) {
+    table.set(name, node.get<std::int64_t>(), origin);
+  } else if (node.is_number()) {
+    table.set(name, node.get<double>(), origin);
+  } else if (node.is_string()) {
+    table.set(name, node.get<std::string>(), origin);
+  } else {
+    throw ConfigError(std::string(origin) + ": " + name + " is neither a number, a flag nor a text; give one of them");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTable& table, std::string_view origin) {
+  if (!config.is_object())
+    throw ConfigError(std::string(origin) + ": the configuration is not a JSON object; give one");
+  std::vector<std::string> unknown;
+  set_values(config, {}, table, origin, unknown);
+  return unknown;
+}
+
+void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
+                 std::string_view origin) try {
+  const auto config = rig::parse_json<nlohmann::ordered_json>(text);
+  std::vector<std::string> unknown;
+  for (const char* table : tables) set_values(config.at(table), table, keys, origin, unknown);
+} catch (const nlohmann::json::exception& error) {
+  throw ConfigError(std::string(origin) + ": " + error.what());
 }
 
 }  // namespace abs_hil::config

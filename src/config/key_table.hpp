@@ -4,6 +4,7 @@
 #include <functional>
 #include <initializer_list>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -26,10 +27,6 @@ struct Key : rig::OptionFacts {
 /// A value from a file or from the command line, before its key has checked the type.
 using Value = std::variant<double, std::int64_t, bool, std::string>;
 
-/// The name and the value of "name=value", without blanks around them. Throws ConfigError for any other text.
-[[nodiscard]] std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment,
-                                                                             std::string_view origin);
-
 /// Converts `text` to a value for the key. A key of text takes it unchanged; other keys read it as TOML would.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);
 
@@ -39,8 +36,15 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// "model.x" for "plant.x"; null for a value that only the plant has, and for a name that is not of the plant.
 [[nodiscard]] const Key* model_key(const std::vector<Key>& keys, std::string_view name);
 
-/// The value as plain text.
-[[nodiscard]] std::string value_text(const Key& key);
+/// The value that the key has.
+[[nodiscard]] Value value_of(const Key& key);
+/// The value as a number; nothing for flags and texts.
+[[nodiscard]] std::optional<double> number_of(const Value& value);
+/// The value as --set takes it.
+[[nodiscard]] std::string text_of(const Value& value);
+/// The value as JSON and as TOML hold it.
+[[nodiscard]] nlohmann::ordered_json json_of(const Value& value);
+[[nodiscard]] std::string toml_of(const Value& value);
 
 /// How the key bears on the safety of a run on a board: as its row says, otherwise as its table. Unclassed in
 /// `driver.`, `gate.`, `guardian.`, `realtime.` and `experiment.`, whose rows must say it.
@@ -63,7 +67,10 @@ class KeyTable {
   /// Sets a value. `origin` says where it came from ("--set", "FILE:LINE"). Throws ConfigError for an unknown name
   /// (with the nearest known one), a value of the wrong type or out of range; then nothing changes.
   void set(std::string_view name, const Value& value, std::string_view origin);
-  /// The same for `name=value` as text.
+  /// The name and the value of "name=value", without blanks around them. Throws ConfigError for any other text, and for
+  /// an unknown name.
+  [[nodiscard]] std::pair<std::string, Value> parsed(std::string_view assignment, std::string_view origin) const;
+  /// Sets `name=value`.
   void set_text(std::string_view assignment, std::string_view origin);
 
   [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }
@@ -98,5 +105,10 @@ class KeyTable {
 /// that does not fit its key, for a table that is missing, and for text that is not JSON.
 void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
                  std::string_view origin);
+
+/// A plant's file to fill in for a rig of one's own: every key of `plant` with its value in `settings`, its meaning,
+/// unit and range, and where to read it off the rig. It can be given to --plant and --model at once.
+/// @param name  of the rig, for the first lines
+[[nodiscard]] std::string rig_file(const Settings& settings, std::string_view name);
 
 }  // namespace abs_hil::config

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "abs_hil/control/registry.hpp"
@@ -18,9 +17,8 @@ std::string LiveSettings::resolve(std::string_view name) const {
   const std::string& controller = settings_.control.controller;
   for (const std::string& prefix : {std::string(), std::string("control."), control::section_of(controller)}) {
     std::string key = prefix + std::string(name);
-    const auto is_named = [&key](const Key& known) { return known.name == key; };
-    const auto known = std::find_if(keys.keys().begin(), keys.keys().end(), is_named);
-    if (known == keys.keys().end()) continue;
+    const Key* known = find_key(keys.keys(), key);
+    if (known == nullptr) continue;
     if (control::changes_in_a_run(key, *known, controller)) return key;
     throw ConfigError(fmt::format("{} cannot be changed while controller {} runs; change control.slip_ref or {}*", key,
                                   controller, control::section_of(controller)));

@@ -1,5 +1,5 @@
-// Merges what people and files say about a run. `fill` has the order of the sources; the checks beside it refuse what
-// contradicts.
+// Merges what people and files say about a run. `read_sources` has the order of the sources; the checks beside it
+// refuse what contradicts.
 #include "config/merge.hpp"
 
 #include <fmt/format.h>
@@ -16,10 +16,10 @@
 #include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"
 
@@ -105,34 +105,6 @@ void apply_board_policy(Settings& s, const KeyTable& keys, bool virtual_time) {
   runtime::apply_board_limits(s.rig.parameters, s.control.rate_Hz, s.gate, s.driver);
 }
 
-/// The configuration files of a run, each read once.
-struct Files {
-  std::vector<FileValue> plant{};
-  std::vector<FileValue> model{};
-  std::vector<FileValue> config{};
-};
-
-Files read_files(const Sources& sources, const std::string& default_plant) {
-  const bool on_rig = sources.backend == "rig";
-  if (on_rig && sources.plant) {
-    throw ConfigError(fmt::format(
-        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *sources.plant));
-  }
-  const std::filesystem::path plant = plant_file(sources.plant.value_or(default_plant));
-  Files files{.plant = on_rig ? read_model(plant) : read_file(plant, Tables::of_plant)};
-  if (sources.model) files.model = read_model(plant_file(*sources.model, "--model"));
-  if (sources.config_file) files.config = read_file(*sources.config_file);
-  return files;
-}
-
-std::vector<FileValue> settings_of(const Script& script) {
-  std::vector<FileValue> values;
-  for (const Setting& setting : script.settings) {
-    values.push_back({setting.key, setting.value, script.at(setting.place)});
-  }
-  return values;
-}
-
 /// The names of plant and model. On a rig the plant's name is the model's.
 void set_names(Settings& s, const Sources& sources) {
   if (sources.plant) s.plant_name = *sources.plant;
@@ -155,60 +127,88 @@ void complete_identity(const Settings& s, KeyTable& keys) {
   }
 }
 
-/// Everything but what the script asks for beyond its settings.
-void fill(Settings& s, KeyTable& keys, const Sources& sources, const Files& files, const Script& script) {
-  s.backend = sources.backend;
-  if (s.on_rig()) keys.leave_out_plant();
-  for (const std::string& assignment : sources.defaults) keys.set_text(assignment, "default");
-  set_names(s, sources);
-  set_all(files.plant, keys);
-  set_all(files.model, keys);
-  set_all(settings_of(script), keys);
-  if (sources.prior_file)
-    set_all(read_prior(*sources.prior_file, s.model_name.empty() ? s.plant_name : s.model_name), keys);
-  set_all(files.config, keys);
+constexpr std::int64_t prior_format = 1;
 
-  const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
-    if (value) keys.set_text(std::string(key) + '=' + *value, option);
+/// The values of a prior (--prior: what the controller has learnt of the rig in the last braking), without its head,
+/// which says for which model it holds. A file that is not there is the first braking's, and has none.
+/// @param model  name of the run's model
+/// Throws ConfigError for a file that is none, of another format, or learnt with another model.
+std::vector<FileValue> read_prior(const std::filesystem::path& file, std::string_view model) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error) return {};
+  std::vector<FileValue> values = read_file(file);
+  const auto refuse = [&](const std::string& why) {
+    throw ConfigError(
+        fmt::format("--prior {}: {}; give the file that a run with --prior has written, or remove it to begin anew",
+                    file.string(), why));
   };
-  set("control.controller", sources.controller, "--controller");
-  set(experiment_key, sources.experiment, "--experiment");
-  set("control.slip_ref", sources.slip_ref, "--slip-ref");
-  set("control.rate_Hz", sources.rate_Hz, "--rate");
-  set("run.seed", sources.seed, "--seed");
-  for (const std::string& assignment : sources.assignments) keys.set_text(assignment, "--set");
-  set_all(sources.changes, keys);
-  for (const std::string& injection : sources.injections) {
-    if (driver::parse_injections(injection).empty())
-      throw ConfigError("--inject is empty; give a fault, or leave it out");
-    s.inject += (s.inject.empty() ? "" : ",") + injection;
+  const auto taken = [&](std::string_view name) {
+    const auto found = std::ranges::find(values, name, &FileValue::name);
+    if (found == values.end()) refuse(fmt::format("has no {}", name));
+    const Value value = found->value;
+    values.erase(found);
+    return value;
+  };
+  if (taken("prior.format") != Value(prior_format)) refuse(fmt::format("is not of format {}", prior_format));
+  if (taken("prior.model") != Value(std::string(model)))
+    refuse(fmt::format("was learnt with another model than {}, which is that of this run", model));
+  for (const FileValue& value : values) {
+    if (!value.name.starts_with("control.")) refuse(fmt::format("holds {}, which no controller learns", value.name));
   }
-  if (sources.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
-  if (s.on_rig()) complete_identity(s, keys);
-  s.realtime.mode = realtime_mode(sources.realtime, s);
+  return values;
+}
+
+/// What files and people say, later ones above earlier ones. The settings of the script rank between the two lists.
+struct Said {
+  std::vector<FileValue> below{};
+  std::vector<FileValue> above{};
+};
+
+Said read_sources(const Sources& sources, Settings& s, const KeyTable& keys) {
+  if (s.on_rig() && sources.plant) {
+    throw ConfigError(fmt::format(
+        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *sources.plant));
+  }
+  Said said;
+  const auto add = [](std::vector<FileValue>& to, const std::vector<FileValue>& values) {
+    to.insert(to.end(), values.begin(), values.end());
+  };
+  const auto add_text = [&keys](std::vector<FileValue>& to, std::string_view assignment, const char* origin) {
+    const auto [name, value] = keys.parsed(assignment, origin);
+    to.push_back({name, value, origin});
+  };
+  for (const std::string& assignment : sources.defaults) add_text(said.below, assignment, "default");
+  const std::filesystem::path plant = plant_file(sources.plant.value_or(s.plant_name));
+  add(said.below, s.on_rig() ? read_model(plant) : read_file(plant, Tables::of_plant));
+  if (sources.model) add(said.below, read_model(plant_file(*sources.model, "--model")));
+  set_names(s, sources);
+  if (sources.prior_file)
+    add(said.above, read_prior(*sources.prior_file, s.model_name.empty() ? s.plant_name : s.model_name));
+  if (sources.config_file) add(said.above, read_file(*sources.config_file));
+  const auto add_option = [&](const char* key, const std::optional<std::string>& value, const char* option) {
+    if (value) add_text(said.above, fmt::format("{}={}", key, *value), option);
+  };
+  add_option("control.controller", sources.controller, "--controller");
+  add_option(experiment_key, sources.experiment, "--experiment");
+  add_option("control.slip_ref", sources.slip_ref, "--slip-ref");
+  add_option("control.rate_Hz", sources.rate_Hz, "--rate");
+  add_option("run.seed", sources.seed, "--seed");
+  for (const std::string& assignment : sources.assignments) add_text(said.above, assignment, "--set");
+  add(said.above, sources.changes);
+  if (sources.wait_for_start) add_text(said.above, "experiment.wait_for_start=true", "--wait-for-start");
+  return said;
 }
 
 /// The experiment that options and files name: its script's settings rank below theirs, so it must be known before they
 /// are set. A name that is no text is refused when it is set.
-std::shared_ptr<const Script> script_of(const Sources& sources, const Files& files) {
+std::shared_ptr<const Script> script_of(const Sources& sources, const Said& said) {
   std::string name = experiment::ExperimentOptions().name;
-  const auto look = [&name](const std::vector<FileValue>& values) {
-    for (const FileValue& value : values) {
-      if (const auto* text = std::get_if<std::string>(&value.value); text != nullptr && value.name == experiment_key)
-        name = *text;
+  for (const auto* values : {&said.below, &said.above}) {
+    for (const FileValue& value : *values) {
+      const auto* text = std::get_if<std::string>(&value.value);
+      if (text != nullptr && value.name == experiment_key) name = *text;
     }
-  };
-  const auto look_at_texts = [&](const std::vector<std::string>& assignments) {
-    for (const std::string& assignment : assignments) {
-      const auto [key, text] = split_assignment(assignment, "--set");
-      if (key == experiment_key) name = text;
-    }
-  };
-  look_at_texts(sources.defaults);
-  look(files.config);
-  name = sources.experiment.value_or(name);
-  look_at_texts(sources.assignments);
-  look(sources.changes);
+  }
   std::shared_ptr<const Script> script = find(name);
   if (!sources.one_of_series) return script;
   auto single = std::make_shared<Script>(*script);
@@ -216,13 +216,29 @@ std::shared_ptr<const Script> script_of(const Sources& sources, const Files& fil
   return single;
 }
 
+/// Everything but what the script asks for beyond its settings.
+void fill(Settings& s, KeyTable& keys, const Sources& sources, const Said& said, const Script& script) {
+  set_all(said.below, keys);
+  for (const Setting& setting : script.settings) keys.set(setting.key, setting.value, script.at(setting.place));
+  set_all(said.above, keys);
+  for (const std::string& injection : sources.injections) {
+    if (driver::parse_injections(injection).empty())
+      throw ConfigError("--inject is empty; give a fault, or leave it out");
+    s.inject += (s.inject.empty() ? "" : ",") + injection;
+  }
+  if (s.on_rig()) complete_identity(s, keys);
+  s.realtime.mode = realtime_mode(sources.realtime, s);
+}
+
 /// Everything but the texts of the configuration.
 void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   Settings& s = merged.settings;
-  const Files files = read_files(sources, s.plant_name);
-  merged.script = script_of(sources, files);
+  s.backend = sources.backend;
+  if (s.on_rig()) keys.leave_out_plant();
+  const Said said = read_sources(sources, s, keys);
+  merged.script = script_of(sources, said);
   const Script& script = *merged.script;
-  fill(s, keys, sources, files, script);
+  fill(s, keys, sources, said, script);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
   }
@@ -284,7 +300,7 @@ Configuration configuration_of(Settings settings) {
   const bool differs = !s.model_name.empty() || s.model != s.plant.rig;
   for (const Key& key : keys.keys()) {
     if (!differs || !key.name.starts_with("model.")) continue;
-    std::visit([&](const auto* value) { keys.set(key.name, *value, "model"); }, key.target);
+    keys.set(key.name, value_of(key), "model");
   }
   write_texts(made, keys);
   return made;
@@ -318,9 +334,7 @@ void choose(const SeriesMember& member, Sources& sources) {
 
 nlohmann::ordered_json varied_json(const SeriesMember& member) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const auto& [key, value] : member.varied) {
-    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
-  }
+  for (const auto& [key, value] : member.varied) json[key] = json_of(value);
   return json;
 }
 
@@ -331,6 +345,22 @@ void refuse_nested(const Script& series, const Script& experiment) {
 
 bool asks(const Script& script) noexcept {
   return std::ranges::any_of(script.phases, [](const PhaseScript& phase) { return !phase.ask.empty(); });
+}
+
+std::string prior_text(const nlohmann::ordered_json& learnt, std::string_view model) {
+  std::string text = fmt::format(
+      "# What the controller has learnt of the rig in its last braking. abs_hil --prior reads and renews it.\n"
+      "prior.format = {}\nprior.model = {}\n",
+      prior_format, nlohmann::json(model).dump());
+  for (const auto& [key, value] : learnt.items()) text += fmt::format("{} = {}\n", key, value.dump());
+  return text;
+}
+
+std::uint64_t sensor_seed(const Settings& s) {
+  if (s.sensor_seed.empty()) return static_cast<std::uint64_t>(s.seed);
+  if (const auto seed = rig::parse_number<std::uint64_t>(s.sensor_seed)) return *seed;
+  throw ConfigError(fmt::format("run.sensor_seed = \"{}\" is not valid; give a whole number in [0, 2^64), or nothing",
+                                s.sensor_seed));
 }
 
 }  // namespace abs_hil::config

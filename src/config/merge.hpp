@@ -1,7 +1,6 @@
 // From what a person says, and the files that it names, to the effective configuration of one run.
 #pragma once
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -67,12 +66,6 @@ void choose(const SeriesMember& member, Sources& sources);
 void refuse_nested(const Script& series, const Script& experiment);
 /// True if a phase of the script asks a person.
 [[nodiscard]] bool asks(const Script& script) noexcept;
-
-/// The values of a prior (--prior: what the controller has learnt of the rig in the last braking), without its head,
-/// which says for which model it holds. A file that is not there is the first braking's, and has none.
-/// @param model  name of the run's model
-/// Throws ConfigError for a file that is none, of another format, or learnt with another model.
-[[nodiscard]] std::vector<FileValue> read_prior(const std::filesystem::path& file, std::string_view model);
 
 /// The text of a prior.
 /// @param learnt  keys below control. and their values

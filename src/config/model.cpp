@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
-#include <variant>
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
@@ -18,10 +17,7 @@ namespace abs_hil::config {
 
 namespace {
 
-double as_double(const Key& key) {
-  if (const auto* whole = std::get_if<std::int32_t*>(&key.target)) return static_cast<double>(**whole);
-  return *std::get<double*>(key.target);
-}
+double as_double(const Key& key) { return number_of(value_of(key)).value(); }
 
 /// Brake torque that holds a slip while the car slows down, from (1) and (2) at a constant slip; slow, so without
 /// viscous friction.

@@ -10,7 +10,6 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "config/config_error.hpp"
-#include "config/library.hpp"
 
 namespace abs_hil::config {
 
@@ -23,19 +22,6 @@ using rig::Reason;
 /// Slack on the time limit of phases that end by their duration.
 constexpr double duration_slack_s = 1.0;
 
-std::optional<double> number_of(const Key& key) {
-  return std::visit(
-      [](const auto* target) -> std::optional<double> {
-        using Target = std::decay_t<decltype(*target)>;
-        if constexpr (std::is_arithmetic_v<Target> && !std::is_same_v<Target, bool>) {
-          return static_cast<double>(*target);
-        } else {
-          return std::nullopt;
-        }
-      },
-      key.target);
-}
-
 /// The kind of a phase in the CSV, derived where the script gives none.
 rig::Phase kind_of(const PhaseScript& phase) {
   if (phase.kind) return *phase.kind;
@@ -44,6 +30,34 @@ rig::Phase kind_of(const PhaseScript& phase) {
   }
   if (phase.brake.action() != BrakeAction::released) return rig::Phase::brake;
   return phase.motor ? rig::Phase::accelerate : rig::Phase::coast;
+}
+
+/// The value of the number under these settings. Throws ConfigError if it is out of its range.
+double value_of(const Script& script, const Number& number, const KeyTable& keys) {
+  if (number.key.empty()) return number.value;
+  const Key* key = find_key(keys.keys(), number.key);
+  const double value = key == nullptr ? std::nan("") : number_of(value_of(*key)).value_or(std::nan(""));
+  if (!number.range.contains(value)) {
+    throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
+                                  script.at(number.place), number.key, value, number.range.text(),
+                                  number.unit.empty() ? "" : " ", number.unit));
+  }
+  return value;
+}
+
+/// True if the condition holds under these settings.
+bool holds(const When& when, const KeyTable& keys) {
+  const Key* key = find_key(keys.keys(), when.key);
+  if (key == nullptr) return false;
+  if (const std::optional<double> value = number_of(value_of(*key))) {
+    const double other = number_of(parse_value(*key, when.value)).value();  // the reader has checked it
+    if (when.operation == "=") return *value == other;
+    if (when.operation == "!=") return *value != other;
+    if (when.operation == "<") return *value < other;
+    if (when.operation == ">") return *value > other;
+    return when.operation == "<=" ? *value <= other : *value >= other;
+  }
+  return (text_of(value_of(*key)) == when.value) == (when.operation == "=");
 }
 
 class Planner {
@@ -72,11 +86,7 @@ class Planner {
     std::vector<experiment::Profile::Point> points;
     points.reserve(script.points.size());
     for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
-    try {
-      return experiment::Profile(std::move(points), script.between);
-    } catch (const std::invalid_argument& error) {
-      throw ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
-    }
+    return experiment::Profile(std::move(points), script.between);
   }
   /// Stores a constant in `constant` and returns an empty profile; returns any other profile.
   [[nodiscard]] experiment::Profile profile_or(const std::optional<ProfileScript>& script, double& constant) const {
@@ -170,34 +180,6 @@ double reached_in(const experiment::PhasePlan& phase, const Reached& reached) {
 }
 
 }  // namespace
-
-double value_of(const Script& script, const Number& number, const KeyTable& keys) {
-  if (number.key.empty()) return number.value;
-  const Key* key = find_key(keys.keys(), number.key);
-  const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
-  if (!number.range.contains(value)) {
-    throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
-                                  script.at(number.place), number.key, value, number.range.text(),
-                                  number.unit.empty() ? "" : " ", number.unit));
-  }
-  return value;
-}
-
-bool holds(const When& when, const KeyTable& keys) {
-  const Key* key = find_key(keys.keys(), when.key);
-  if (key == nullptr) return false;
-  if (const std::optional<double> value = number_of(*key)) {
-    const Value wanted = parse_value(*key, when.value);
-    const auto* whole = std::get_if<std::int64_t>(&wanted);
-    const double other = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(wanted);
-    if (when.operation == "=") return *value == other;
-    if (when.operation == "!=") return *value != other;
-    if (when.operation == "<") return *value < other;
-    if (when.operation == ">") return *value > other;
-    return when.operation == "<=" ? *value <= other : *value >= other;
-  }
-  return (value_text(*key) == when.value) == (when.operation == "=");
-}
 
 bool means_to_stop(const Plan& plan, double end_speed_m_s) {
   const auto& phases = plan.phases;

@@ -27,11 +27,6 @@ struct Plan {
 /// Throws config::ConfigError for events that contradict each other.
 void apply(const Script& script, config::Settings& settings);
 
-/// The value of the number under these settings. Throws config::ConfigError if it is out of its range.
-[[nodiscard]] double value_of(const Script& script, const Number& number, const config::KeyTable& keys);
-/// True if the condition holds under these settings.
-[[nodiscard]] bool holds(const When& when, const config::KeyTable& keys);
-
 /// True if the plan brakes and then waits for a stop: its last phase of kind brake, or one after it, ends only at
 /// standstill or below a car speed of at most `end_speed_m_s`.
 [[nodiscard]] bool means_to_stop(const Plan& plan, double end_speed_m_s);
@@ -43,5 +38,9 @@ void apply(const Script& script, config::Settings& settings);
 /// Describes which limits of time, distance and speed every run of the plan must exceed, so that it ends as a fault;
 /// empty: none.
 [[nodiscard]] std::vector<std::string> certain_faults(const Plan& plan, const config::Settings& settings);
+
+/// Describes in words how the script runs under these settings: phases, their ends, limits, events, series. Throws
+/// ConfigError if the script cannot run under these settings.
+[[nodiscard]] std::string explain(const Script& script, const Settings& settings);
 
 }  // namespace abs_hil::config

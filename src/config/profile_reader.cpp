@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 
 #include "config/reader.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 
@@ -29,11 +29,11 @@ class ProfileReader {
     if (has("from") || has("to") || has("over")) {
       const Number from = value("from", "a ramp");
       const Number to = value("to", "a ramp");
-      profile_.points = {{seconds(0.0, from.place), from}, {reader_.number(need("over", "a ramp")), to}};
+      profile_.points = {{seconds(0.0, from.place), from}, {reader_.get<Number>(need("over", "a ramp")), to}};
     } else if (has("before") || has("after") || has("at")) {
       const Number before = value("before", "a step");
       const Number after = value("after", "a step");
-      const Number at = reader_.number(need("at", "a step"));
+      const Number at = reader_.get<Number>(need("at", "a step"));
       profile_.points = {{seconds(0.0, before.place), before}, {at, before}, {at, after}};
     } else if (const Entry* points = reader_.find("points")) {
       read_points(*points);
@@ -132,7 +132,7 @@ class ProfileReader {
   }
 
   void read_file(const Entry& entry) {
-    const std::string name = reader_.text(entry);
+    const auto name = reader_.get<std::string>(entry);
     if (name.empty() || name.find('/') != std::string::npos || !name.ends_with(".csv")) {
       reader_.fail(entry.place,
                    fmt::format("file = \"{}\": name a .csv file beside the script, without a folder", name));
@@ -155,17 +155,14 @@ class ProfileReader {
         reader_.fail(place, fmt::format("file \"{}\": the first line is wrong; give time_s,value", name));
       }
       if (row == 1 || line.empty()) continue;
-      const char* end = line.data() + line.size();
-      double time_s = 0.0;
-      double value = 0.0;
-      const auto first = std::from_chars(line.data(), end, time_s);
-      const bool comma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
-      const auto second = comma ? std::from_chars(first.ptr + 1, end, value) : first;
-      if (!comma || second.ec != std::errc() || second.ptr != end || !facts_.range.contains(value)) {
+      const std::size_t comma = std::min(line.find(','), line.size());
+      const auto time_s = rig::parse_number<double>(line.substr(0, comma));
+      const auto value = rig::parse_number<double>(line.substr(std::min(comma + 1, line.size())));
+      if (!time_s || !value || !facts_.range.contains(*value)) {
         reader_.fail(place, fmt::format("file \"{}\", line {}: give a time in s and a value in {}", name, row,
                                         facts_.range.text()));
       }
-      add_point(time_s, {.value = value, .unit = facts_.unit, .range = facts_.range, .place = place}, place);
+      add_point(*time_s, {.value = *value, .unit = facts_.unit, .range = facts_.range, .place = place}, place);
     }
     if (profile_.points.empty())
       reader_.fail(place, fmt::format("file \"{}\" holds no points; give at least one", name));
@@ -179,8 +176,11 @@ class ProfileReader {
 
 }  // namespace
 
-ProfileScript TableReader::profile(const Entry& entry) const {
-  if (entry.node->is_table()) return ProfileReader(*this, entry).read();
+void TableReader::read(const Entry& entry, ProfileScript& profile) const {
+  if (entry.node->is_table()) {
+    profile = ProfileReader(*this, entry).read();
+    return;
+  }
   const rig::OptionFacts& facts = entry.field->facts;
   const auto* text = entry.node->as_string();
   if (text != nullptr && !facts.allowed.empty() && !text->get().starts_with('$') &&
@@ -190,7 +190,7 @@ ProfileScript TableReader::profile(const Entry& entry) const {
                                   entry.key, shown(*entry.node), fmt::join(facts.allowed.list(), "\", \""),
                                   facts.range.text(), facts.meaning));
   }
-  return {.points = {{seconds(0.0, entry.place), number(entry)}}, .place = entry.place};
+  profile = {.points = {{seconds(0.0, entry.place), get<Number>(entry)}}, .place = entry.place};
 }
 
 }  // namespace abs_hil::config

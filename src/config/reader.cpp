@@ -44,18 +44,6 @@ std::string advice(const Source& source, std::string_view key, const toml::node&
   return fmt::format("the nearest known key is \"{}\"", rig::nearest_name(key, names));
 }
 
-std::string_view kind_of(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table: return "a table";
-    case toml::node_type::array: return "a list";
-    case toml::node_type::string: return "a text";
-    case toml::node_type::integer: return "a whole number";
-    case toml::node_type::floating_point: return "a number";
-    case toml::node_type::boolean: return "a flag";
-    default: return "a date or time";
-  }
-}
-
 /// The node as a whole number in the row's range; nothing for anything else.
 std::optional<std::int64_t> whole_in(const toml::node& node, const rig::Range& range) {
   const auto* number = node.as_integer();
@@ -63,12 +51,25 @@ std::optional<std::int64_t> whole_in(const toml::node& node, const rig::Range& r
                                                                                  : std::nullopt;
 }
 
-/// Calls `add` for each element of a list.
-template <class Add>
-void for_each_element(const Entry& entry, const Add& add) {
-  if (const auto* list = entry.node->as_array()) {
-    for (const toml::node& node : *list) add(node);
+/// The elements of a list as `read` makes them: nothing of one that is not valid. Refuses an empty list, too.
+/// @param whole  what to give in place of the list @param each  in place of an element
+template <class Value, class Read>
+std::vector<Value> elements(const TableReader& reader, const Entry& entry, std::string_view whole,
+                            const std::string& each, const Read& read) {
+  std::vector<Value> all;
+  const auto* list = entry.node->as_array();
+  for (std::size_t n = 0; list != nullptr && n < list->size(); ++n) {
+    const toml::node& node = (*list)[n];
+    std::optional<Value> value = read(node);
+    if (!value) reader.fail(place_of(node.source()), fmt::format("{} holds {}: give {}", entry.key, shown(node), each));
+    all.push_back(std::move(*value));
   }
+  if (all.empty()) {
+    const std::string given =
+        entry.node->is_table() ? entry.key + " is a table" : fmt::format("{} = {}", entry.key, shown(*entry.node));
+    reader.fail(entry.place, fmt::format("{}: give a list of {} ({})", given, whole, entry.field->facts.meaning));
+  }
+  return all;
 }
 
 }  // namespace
@@ -130,6 +131,14 @@ std::string shown(const toml::node& node) {
   return rig::clean_text(text, longest_shown);
 }
 
+std::optional<Value> value_in(const toml::node& node) {
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* flag = node.as_boolean()) return flag->get();
+  if (const auto* integer = node.as_integer()) return integer->get();
+  if (const auto* real = node.as_floating_point()) return real->get();
+  return std::nullopt;
+}
+
 TableReader::TableReader(const Source& source, const toml::table& table, const Grammar& grammar, Place place)
     : source_(source), place_(table.source().begin.line > 0 ? place_of(table.source()) : place) {
   for (const auto& [key, node] : table) {
@@ -175,32 +184,30 @@ bool TableReader::is_allowed_text(const Entry& entry) noexcept {
   return text != nullptr && !allowed.empty() && allowed.contains(text->get());
 }
 
-std::string TableReader::text(const Entry& entry) const {
+void TableReader::read(const Entry& entry, std::string& text) const {
   const rig::OptionFacts& facts = entry.field->facts;
-  const auto* text = entry.node->as_string();
-  if (text == nullptr || !facts.allowed.contains(text->get())) {
+  const auto* given = entry.node->as_string();
+  if (given == nullptr || !facts.allowed.contains(given->get())) {
     fail(entry.place, fmt::format("{} = {}: give {} ({})", entry.key, shown(*entry.node),
                                   facts.allowed.empty() ? "a text in quotes" : "one of " + quoted(facts.allowed.list()),
                                   facts.meaning));
   }
-  return text->get();
+  text = given->get();
 }
 
-void TableReader::flag(const Entry& entry) const {
-  const auto* flag = entry.node->as_boolean();
-  if (flag == nullptr || !flag->get()) {
-    fail(entry.place, fmt::format("{} = {}: write true", entry.key, shown(*entry.node)));
-  }
+void TableReader::read(const Entry& entry, bool& flag) const {
+  flag = entry.node->value_exact<bool>().value_or(false);
+  if (!flag) fail(entry.place, fmt::format("{} = {}: write true", entry.key, shown(*entry.node)));
 }
 
-Number TableReader::number(const Entry& entry) const {
-  return read_number(source_, *entry.node, entry.field->facts, entry.key, entry.has_suffix);
+void TableReader::read(const Entry& entry, Number& number) const {
+  number = read_number(source_, *entry.node, entry.field->facts, entry.key, entry.has_suffix);
 }
 
-double TableReader::plain_number(const Entry& entry) const {
-  const Number number = this->number(entry);
-  if (!number.key.empty()) fail(number.place, fmt::format("{}: give a number, not a $key", entry.key));
-  return number.value;
+void TableReader::read(const Entry& entry, double& number) const {
+  const auto given = get<Number>(entry);
+  if (!given.key.empty()) fail(given.place, fmt::format("{}: give a number, not a $key", entry.key));
+  number = given.value;
 }
 
 std::int64_t TableReader::whole(const Entry& entry) const {
@@ -213,38 +220,17 @@ std::int64_t TableReader::whole(const Entry& entry) const {
   return *number;
 }
 
-std::vector<std::string> TableReader::texts(const Entry& entry) const {
-  std::vector<std::string> all;
-  for_each_element(entry, [&](const toml::node& node) {
+void TableReader::read(const Entry& entry, std::vector<std::string>& texts) const {
+  texts = elements<std::string>(*this, entry, "texts", "texts in quotes", [](const toml::node& node) {
     const auto* text = node.as_string();
-    if (text == nullptr || text->get().empty()) {
-      fail(place_of(node.source()), fmt::format("{} holds {}: give texts in quotes", entry.key, shown(node)));
-    }
-    all.push_back(text->get());
+    return text == nullptr || text->get().empty() ? std::nullopt : std::optional(text->get());
   });
-  if (all.empty()) {
-    fail(entry.place,
-         fmt::format("{} = {}: give a list of texts ({})", entry.key, shown(*entry.node), entry.field->facts.meaning));
-  }
-  return all;
 }
 
-std::vector<std::int64_t> TableReader::wholes(const Entry& entry) const {
-  const rig::OptionFacts& facts = entry.field->facts;
-  std::vector<std::int64_t> numbers;
-  for_each_element(entry, [&](const toml::node& node) {
-    const std::optional<std::int64_t> number = whole_in(node, facts.range);
-    if (!number) {
-      fail(place_of(node.source()),
-           fmt::format("{} holds {}: give whole numbers in {}", entry.key, shown(node), facts.range.text()));
-    }
-    numbers.push_back(*number);
-  });
-  if (numbers.empty()) {
-    fail(entry.place, fmt::format("{} = {}: give a list of whole numbers, [1, 2, 3] ({})", entry.key,
-                                  shown(*entry.node), facts.meaning));
-  }
-  return numbers;
+void TableReader::read(const Entry& entry, std::vector<std::int64_t>& wholes) const {
+  const rig::Range& range = entry.field->facts.range;
+  wholes = elements<std::int64_t>(*this, entry, "whole numbers, [1, 2, 3]", "whole numbers in " + range.text(),
+                                  [&range](const toml::node& node) { return whole_in(node, range); });
 }
 
 const toml::table& TableReader::table(const Entry& entry) const {
@@ -258,19 +244,9 @@ const toml::table& TableReader::table(const Entry& entry) const {
 }
 
 std::vector<const toml::table*> TableReader::tables(const Entry& entry) const {
-  std::vector<const toml::table*> tables;
-  for_each_element(entry, [&](const toml::node& node) {
-    if (!node.is_table()) {
-      fail(place_of(node.source()), fmt::format("{} holds {}: give tables only", entry.key, shown(node)));
-    }
-    tables.push_back(node.as_table());
+  return elements<const toml::table*>(*this, entry, "tables", "tables only", [](const toml::node& node) {
+    return node.is_table() ? std::optional(node.as_table()) : std::nullopt;
   });
-  if (tables.empty()) {
-    fail(entry.place,
-         fmt::format("{} is {}: give a list of tables ({})", entry.key,
-                     entry.node->is_array() ? "an empty list" : kind_of(*entry.node), entry.field->facts.meaning));
-  }
-  return tables;
 }
 
 Number read_number(const Source& source, const toml::node& node, const rig::OptionFacts& facts, std::string_view what,

@@ -71,27 +71,33 @@ class TableReader {
   [[nodiscard]] Place place() const noexcept { return place_; }
   [[noreturn]] void fail(Place place, std::string_view message) const { source_.fail(place, message); }
 
-  [[nodiscard]] std::string text(const Entry& entry) const;
-  void flag(const Entry& entry) const;  ///< the value must be true
-  [[nodiscard]] Number number(const Entry& entry) const;
-  [[nodiscard]] double plain_number(const Entry& entry) const;  ///< no $key
+  // Reads a value of any type that a member of a table may have.
+  void read(const Entry& entry, std::string& text) const;
+  void read(const Entry& entry, bool& flag) const;      ///< must be true
+  void read(const Entry& entry, double& number) const;  ///< no $key
+  void read(const Entry& entry, Number& number) const;
+  void read(const Entry& entry, std::vector<std::int64_t>& wholes) const;
+  void read(const Entry& entry, std::vector<std::string>& texts) const;
+  void read(const Entry& entry, When& when) const;
+  void read(const Entry& entry, ProfileScript& profile) const;
+  void read(const Entry& entry, std::vector<ConditionScript>& conditions) const;
+  void read(const Entry& entry, std::vector<Setting>& settings) const;
+  void read(const Entry& entry, std::vector<Factor>& factors) const;
+  template <class Member>
+  void read(const Entry& entry, Member& member) const;
+  template <class Value>
+  [[nodiscard]] Value get(const Entry& entry) const {
+    Value value{};
+    read(entry, value);
+    return value;
+  }
+
   [[nodiscard]] std::int64_t whole(const Entry& entry) const;
-  [[nodiscard]] std::vector<std::int64_t> wholes(const Entry& entry) const;
-  [[nodiscard]] std::vector<std::string> texts(const Entry& entry) const;
-  [[nodiscard]] When when(const Entry& entry) const;
-  [[nodiscard]] ProfileScript profile(const Entry& entry) const;
-  [[nodiscard]] std::vector<ConditionScript> conditions(const Entry& entry) const;
-  [[nodiscard]] std::vector<Setting> settings(const Entry& entry) const;
-  [[nodiscard]] std::vector<Factor> factors(const Entry& entry) const;
   [[nodiscard]] const toml::table& table(const Entry& entry) const;
   /// The tables of a list; not empty.
   [[nodiscard]] std::vector<const toml::table*> tables(const Entry& entry) const;
   /// True if the value is one of the texts that the row allows in place of a profile or a table.
   [[nodiscard]] static bool is_allowed_text(const Entry& entry) noexcept;
-
-  /// Reads a value of any type that a member of a table may have.
-  template <class Member>
-  void read(const Entry& entry, Member& member) const;
 
  private:
   const Source& source_;
@@ -113,40 +119,17 @@ void read_table(const Source& source, const toml::table& table, Place place, T& 
 template <class Member>
 void TableReader::read(const Entry& entry, Member& member) const {
   using Element = typename ElementOf<Member>::type;
-  if constexpr (std::is_same_v<Member, std::string>) {
-    member = text(entry);
-  } else if constexpr (std::is_enum_v<Member>) {
-    const std::string word = text(entry);
+  if constexpr (std::is_enum_v<Member>) {
+    const auto word = get<std::string>(entry);
     member = std::ranges::find(words_of<Member>, word, [](const auto& row) { return row.first; })->second;
-  } else if constexpr (std::is_same_v<Member, bool>) {
-    flag(entry);
-    member = true;
   } else if constexpr (std::is_integral_v<Member>) {
     member = static_cast<Member>(whole(entry));
-  } else if constexpr (std::is_same_v<Member, double>) {
-    member = plain_number(entry);
-  } else if constexpr (std::is_same_v<Member, Number>) {
-    member = number(entry);
-  } else if constexpr (std::is_same_v<Member, When>) {
-    member = when(entry);
-  } else if constexpr (std::is_same_v<Member, ProfileScript>) {
-    member = profile(entry);
-  } else if constexpr (std::is_same_v<Element, std::string>) {
-    member = texts(entry);
-  } else if constexpr (std::is_same_v<Element, std::int64_t>) {
-    member = wholes(entry);
-  } else if constexpr (std::is_same_v<Element, Setting>) {
-    member = settings(entry);
-  } else if constexpr (std::is_same_v<Element, Factor>) {
-    member = factors(entry);
-  } else if constexpr (std::is_same_v<Element, ConditionScript>) {
-    member = conditions(entry);
   } else if constexpr (Table<Element>) {
     for (const toml::table* one : tables(entry)) read_table(source_, *one, entry.place, member.emplace_back());
   } else if constexpr (Table<Member>) {
     if constexpr (requires { member.word; }) {
       if (is_allowed_text(entry)) {
-        member.word = text(entry);
+        read(entry, member.word);
         return;
       }
     }
@@ -164,7 +147,21 @@ void TableReader::read(const Entry& entry, Member& member) const {
 /// @param unit_is_named true if the key's name gives the unit
 [[nodiscard]] Number read_number(const Source& source, const toml::node& node, const rig::OptionFacts& facts,
                                  std::string_view what, bool unit_is_named);
-/// A configuration value as TOML holds it.
-[[nodiscard]] Value read_value(const Source& source, std::string_view key, const toml::node& node);
+/// A configuration value as TOML holds it; nothing for what is none.
+[[nodiscard]] std::optional<Value> value_in(const toml::node& node);
+/// Calls `visit(dotted name, place of the name, node)` for each value below a table of configuration keys. A table
+/// for which `is_value` is true is a value.
+template <class IsValue, class Visit>
+void for_each_value(const toml::table& table, const std::string& prefix, const IsValue& is_value, const Visit& visit) {
+  for (const auto& [name, node] : table) {
+    const std::string key = prefix + (prefix.empty() ? "" : ".") + std::string(name.str());
+    const auto* inner = node.as_table();
+    if (inner != nullptr && !is_value(*inner)) {
+      for_each_value(*inner, key, is_value, visit);
+    } else {
+      visit(key, place_of(name.source()), node);
+    }
+  }
+}
 
 }  // namespace abs_hil::config

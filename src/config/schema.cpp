@@ -1,7 +1,6 @@
 // The JSON Schema of experiments, from the rows that the reader uses.
 #include <nlohmann/json.hpp>
 
-#include "config/explain.hpp"
 #include "config/grammar.hpp"
 #include "config/key_table.hpp"
 #include "config/script.hpp"

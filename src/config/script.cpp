@@ -1,4 +1,5 @@
-// The rules of an experiment's file that concern several keys at once, and its events as profiles of the plant.
+// Finds and reads an experiment's file: the rules that concern several keys at once, and its events as profiles of the
+// plant.
 #include "config/script.hpp"
 
 #include <fmt/format.h>
@@ -6,14 +7,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <iterator>
+#include <mutex>
 
 #include "config/config_error.hpp"
+#include "config/config_file.hpp"
 #include "config/reader.hpp"
 #include "driver/injection/injection.hpp"
 #include "rig/run_names.hpp"
 
 namespace abs_hil::config {
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -90,14 +95,19 @@ void check_order(const Script& script, const EventScript& before, const EventScr
   }
 }
 
-std::optional<std::string> text_of_file(const std::filesystem::path& path) {
+std::optional<std::string> text_of_file(const fs::path& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
   std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
   if (!file) return std::nullopt;
-  return text.str();
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+/// A configuration folder of the user may lack experiments. Then those of the program serve.
+fs::path experiments_dir() {
+  const fs::path named = config_dir() / "experiments";
+  std::error_code error;
+  return fs::is_directory(named, error) ? named : own_config_dir() / "experiments";
 }
 
 }  // namespace
@@ -298,7 +308,7 @@ Script parse(std::string text, std::string path, const FileReader& read_file) {
 }
 
 Script load(const std::string& path) {
-  const std::filesystem::path file(path);
+  const fs::path file(path);
   std::optional<std::string> text = text_of_file(file);
   if (!text) {
     throw ConfigError(
@@ -306,6 +316,26 @@ Script load(const std::string& path) {
   }
   return parse(std::move(*text), path,
                [&file](const std::string& name) { return text_of_file(file.parent_path() / name); });
+}
+
+std::shared_ptr<const Script> find(const std::string& name_or_file) {
+  static std::mutex mutex;
+  static std::map<std::string, std::shared_ptr<const Script>> read;
+  const std::string file = named_file(&experiments_dir, "experiment", name_or_file, "--experiment").string();
+  const std::scoped_lock lock(mutex);
+  std::shared_ptr<const Script>& script = read[file];
+  if (!script) {
+    Script fresh = load(file);
+    fresh.name = name_or_file;
+    script = std::make_shared<const Script>(std::move(fresh));
+  }
+  return script;
+}
+
+std::vector<std::shared_ptr<const Script>> known_experiments() {
+  std::vector<std::shared_ptr<const Script>> scripts;
+  for (const std::string& name : names_in(experiments_dir())) scripts.push_back(find(name));
+  return scripts;
 }
 
 }  // namespace abs_hil::config

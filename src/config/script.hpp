@@ -3,14 +3,15 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "config/factors.hpp"
 #include "config/grammar.hpp"
 #include "config/key_table.hpp"
 #include "experiment/sequence.hpp"
@@ -20,6 +21,12 @@
 namespace abs_hil::config {
 
 class TableReader;
+
+/// A place in a file. Line and column count from 1.
+struct Place {
+  unsigned int line{0};
+  unsigned int column{0};
+};
 
 /// A number of a script: a constant, or the value of a configuration key, which is looked up when the run is planned.
 struct Number {
@@ -233,6 +240,45 @@ struct SeriesScript {
   }
 };
 
+// Configuration values in which runs differ: the table [factors] of experiments and studies.
+
+/// Every value is combined with every value of the other factors.
+struct Levels {
+  std::vector<Value> values{};
+};
+
+/// Uniform between its ends, or uniform in the logarithm.
+struct Uniform {
+  double from{0.0};
+  double to{0.0};
+  bool logarithmic{false};
+};
+
+/// Normal, cut off at its ends.
+struct Normal {
+  double mean{0.0};
+  double sd{0.0};
+  double least{0.0};
+  double most{0.0};
+};
+
+/// A configuration key and the values that it takes.
+struct Factor {
+  std::string key{};
+  std::variant<Levels, Uniform, Normal> values{};
+  Place place{};  ///< of the key
+  [[nodiscard]] bool has_range() const noexcept { return !std::holds_alternative<Levels>(values); }
+};
+
+/// The value at the probability `u` in (0, 1), for a factor with a range. It lies within the range, whatever the
+/// rounding. Throws std::bad_variant_access for levels.
+[[nodiscard]] double quantile(const Factor& factor, double u);
+/// The value of a range at `u` in [0, 1]: its ends at 0 and 1. Real-time safe.
+[[nodiscard]] double at(const Uniform& range, double u) noexcept;
+
+/// False for the keys that say who runs a script, and on what: neither settings nor factors of a script may name them.
+[[nodiscard]] bool script_may_set(std::string_view key) noexcept;
+
 /// A configuration value that the script sets.
 struct Setting {
   std::string key;
@@ -297,5 +343,14 @@ using FileReader = std::function<std::optional<std::string>(const std::string& n
 
 /// The script of that file. Throws ConfigError.
 [[nodiscard]] Script load(const std::string& path);
+
+/// The experiment of that name, a file in config_dir()/experiments, or the file itself if it is a path or ends in
+/// .toml. The process reads each file once. Throws ConfigError, naming the known ones. Thread-safe.
+[[nodiscard]] std::shared_ptr<const Script> find(const std::string& name_or_file);
+/// The experiments in config_dir()/experiments, by name.
+[[nodiscard]] std::vector<std::shared_ptr<const Script>> known_experiments();
+
+/// The JSON Schema (draft 2020-12) of scripts, for editors. It is made from the parser's own grammar.
+[[nodiscard]] nlohmann::ordered_json schema();
 
 }  // namespace abs_hil::config

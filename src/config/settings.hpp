@@ -45,7 +45,7 @@ struct Settings {
   /// The rig as controllers, observers, actuator estimate and feed-forward know it. KeyTable gives each value that
   /// nobody sets the plant's value.
   ABS_HIL_GROUP(rig::RigParameters, model, "model.", {});
-  /// What the rig behind a board is: see `identity`.
+  /// What the rig behind a board is. In simulation that is the plant.
   ABS_HIL_GROUP(experiment::RigIdentity, rig, "rig.", {});
   ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
   ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
@@ -70,16 +70,13 @@ struct Settings {
   [[nodiscard]] bool on_rig() const noexcept { return backend == "rig"; }
 };
 
-/// What the limits of gate and checks know of the rig, never the model: on a board `rig.`, in simulation the plant.
-[[nodiscard]] rig::RigParameters identity(const Settings& s);
-
 /// The seed of the encoders' first positions. Throws ConfigError for a text that is no such number.
 [[nodiscard]] std::uint64_t sensor_seed(const Settings& s);
 
 /// What the outputs of the settings' backend make of a command. Throws driver::Unavailable for an unknown board.
-[[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s) {
-  return s.backend == "rig" ? driver::output_grid(s.driver)
-                            : driver::simulated_output_grid(s.driver, s.plant.ideal_actuator);
+/// @param plant  the simulated rig; not used on a board
+[[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s, const plant_sim::PlantOptions& plant) {
+  return s.on_rig() ? driver::output_grid(s.driver) : driver::simulated_output_grid(s.driver, plant.ideal_actuator);
 }
 
 }  // namespace abs_hil::config

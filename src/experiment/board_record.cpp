@@ -22,40 +22,26 @@ namespace fs = std::filesystem;
 
 constexpr int record_format = 1;
 
-std::string text_of(double value) { return fmt::format("{}", value); }
-std::string text_of(std::int32_t value) { return std::to_string(value); }
-std::string text_of(std::int64_t value) { return std::to_string(value); }
-std::string text_of(bool value) { return value ? "true" : "false"; }
-std::string text_of(const std::string& value) { return value; }
-
-/// The values of all options of `driver.KIND.`, as text.
-std::map<std::string, std::string> option_texts(driver::BoardOptions options, const std::string& prefix) {
+/// The values of all options, as text.
+template <class Options>
+std::map<std::string, std::string> texts_of(Options options, const std::string& prefix) {
   std::map<std::string, std::string> texts;
-  options.visit_options(prefix, [&](const std::string& name, const rig::OptionFacts&, const rig::OptionTarget& target) {
-    texts[name] = std::visit([](const auto* value) { return text_of(*value); }, target);
+  rig::for_each_option(options, prefix, [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    texts[name] = fmt::format("{}", value);
   });
   return texts;
 }
 
 /// The rig's parameters, as text. The name of their source tells nothing: its file may have changed.
 std::map<std::string, std::string> identity_texts(const RigIdentity& identity) {
-  std::map<std::string, std::string> texts;
-  rig::for_each_option(
-      identity.parameters, "rig.",
-      [&](const std::string& name, const rig::OptionFacts&, const auto& value) { texts[name] = text_of(value); });
-  return texts;
+  return texts_of(identity.parameters, "rig.");
 }
 
 bool is_cap(const std::string& name) { return name.ends_with("_duty_max"); }
 
 std::string file_name(const BoardRecord& record) {
-  std::string name = record.kind + '-' + (record.board.place.empty() ? "board" : record.board.place);
-  for (char& c : name) {
-    const bool plain =
-        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '.';
-    if (!plain) c = '_';
-  }
-  return name + ".json";
+  return rig::plain_name(record.kind + '-' + (record.board.place.empty() ? "board" : record.board.place), "-.") +
+         ".json";
 }
 
 nlohmann::ordered_json optional_json(const std::optional<double>& value) {
@@ -121,6 +107,18 @@ std::string described(const driver::BoardIdentity& board) {
   return (board.place.empty() ? "board" : board.place) + (board.logic.empty() ? "" : ", " + board.logic);
 }
 
+/// `abs_hil commission` with the options of `driver.` that differ from their defaults, and the identity's source.
+std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
+  auto defaults = texts_of(driver::DriverOptions{}, "driver.");
+  std::string command = "abs_hil commission";
+  rig::for_each_option(options, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    const std::string text = fmt::format("{}", value);
+    if (text != defaults[name]) command += " --set " + name + '=' + text;
+  });
+  if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
+  return command;
+}
+
 }  // namespace
 
 BoardRecord describe_board(const driver::DriverOptions& options, const RigIdentity& identity,
@@ -130,7 +128,7 @@ BoardRecord describe_board(const driver::DriverOptions& options, const RigIdenti
   BoardRecord record{.kind = options.kind,
                      .board = board,
                      .emulated = emulated,
-                     .options = option_texts(chosen.options, prefix),
+                     .options = texts_of(chosen.options, prefix),
                      .encoder_counts_per_rev = options.encoder_counts_per_rev,
                      .identity = identity_texts(identity)};
   for (const std::string_view free : chosen.entry.free_options) record.options.erase(prefix + std::string(free));
@@ -197,22 +195,6 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
       "the commissioning record cannot be written (" + problems +
       "); give a folder with --set driver.records=DIR, or make one: sudo install -d -g abs_hil -m "
       "2775 /var/lib/abs_hil/boards");
-}
-
-std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
-  driver::DriverOptions now = options;
-  driver::DriverOptions standard;
-  std::map<std::string, std::string> defaults;
-  rig::for_each_option(standard, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    defaults[name] = text_of(value);
-  });
-  std::string command = "abs_hil commission";
-  rig::for_each_option(now, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
-    const std::string text = text_of(value);
-    if (text != defaults[name]) command += " --set " + name + '=' + text;
-  });
-  if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
-  return command;
 }
 
 std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,

@@ -19,8 +19,8 @@ struct OutputTimes {
   std::optional<double> release_ms{};   ///< from the order of the safe state until it was verified
 };
 
-/// Counts of one turn by hand of each wheel. 0: not measured.
-struct TurnCounts {
+/// Counts that the wheels have moved by.
+struct WheelCounts {
   std::int32_t upper{0};
   std::int32_t lower{0};
 };
@@ -35,7 +35,7 @@ struct BoardRecord {
   /// "rig.theta_N" -> "23": the rig's identity. Empty in records from before there was one: it is the default then.
   std::map<std::string, std::string> identity{};
   OutputTimes outputs{};
-  TurnCounts one_turn{};
+  WheelCounts one_turn{};  ///< of each wheel, by hand; 0: not measured
   std::string date{};
   std::string version{};  ///< of the program
 };
@@ -60,8 +60,5 @@ std::filesystem::path write_record(const BoardRecord& record, const std::vector<
 /// @return what a person should know of the record that holds; empty: nothing
 std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
                            const driver::BoardIdentity& board);
-
-/// `abs_hil commission` with the options of `driver.` that differ from their defaults, and the identity's source.
-[[nodiscard]] std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity);
 
 }  // namespace abs_hil::experiment

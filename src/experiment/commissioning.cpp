@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -32,19 +33,22 @@ void require(bool in_range, const char* what, double value, const char* range) {
   if (!in_range) throw std::invalid_argument(formatted("%s = %g: give a number in %s", what, value, range));
 }
 
-/// Makes the rig safe, however a step ends.
-class SafeAtEnd {
- public:
-  explicit SafeAtEnd(driver::RigDriver& driver) : driver_(driver) {}
-  SafeAtEnd(const SafeAtEnd&) = delete;
-  SafeAtEnd& operator=(const SafeAtEnd&) = delete;
-  ~SafeAtEnd() { static_cast<void>(driver_.deactivate()); }
-
- private:
-  driver::RigDriver& driver_;
-};
+std::string in_words(const OutputTimes& times) {
+  if (!times.reported) return "this board does not report its outputs: its watchdog and its release were not measured";
+  const std::string watchdog =
+      times.watchdog_ms
+          ? formatted("without commands the board ends its outputs by itself after %.1f ms", *times.watchdog_ms)
+          : formatted("without commands the board HOLDS its outputs, for %.0f ms at least: it has no watchdog",
+                      times.watched_ms);
+  return watchdog + formatted("; the safe state was verified %.3f ms after its order", times.release_ms.value_or(0.0));
+}
 
 }  // namespace
+
+WheelCounts travel_between(const rig::Measurement& before, const rig::Measurement& after) noexcept {
+  return {.upper = rig::counts_between(before.upper_counts, after.upper_counts),
+          .lower = rig::counts_between(before.lower_counts, after.lower_counts)};
+}
 
 std::string reason_and_error(const driver::IoResult& result) {
   const std::string error = driver::error_text(result);
@@ -60,26 +64,17 @@ Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, D
       options_(options),
       stop_requested_(std::move(stop_requested)) {
   require(options.drive_duty > 0.0 && options.drive_duty <= 0.3, "drive duty", options.drive_duty, "(0, 0.3]");
-  require(options.drive_pulse_s > 0.0 && options.drive_pulse_s <= 1.0, "drive pulse", options.drive_pulse_s,
-          "(0, 1] s");
   require(options.brake_duty > 0.0 && options.brake_duty <= 0.7, "brake duty", options.brake_duty, "(0, 0.7]");
-  require(options.brake_pulse_s > 0.0 && options.brake_pulse_s <= 1.0, "brake pulse", options.brake_pulse_s,
-          "(0, 1] s");
-  require(options.silence_s > 0.0 && options.silence_s <= 1.0, "silence", options.silence_s, "(0, 1] s");
   require(options.encoder_counts_per_rev > 0, "encoder counts per turn", options.encoder_counts_per_rev, "(0, inf)");
-  require(options.run_out_limit_s > 0.0, "run-out limit", options.run_out_limit_s, "(0, inf) s");
-}
-
-CommissioningResult Commissioning::unless_stopped(CommissioningResult result) const {
-  return stop_requested_() ? CommissioningResult::interrupted : result;
 }
 
 CommissioningResult Commissioning::run() {
-  const SafeAtEnd safe(driver_);
+  // Makes the rig safe, however a step ends.
+  const std::shared_ptr<void> at_end(nullptr, [this](void*) { static_cast<void>(driver_.deactivate()); });
   for (const auto step : {&Commissioning::read_board, &Commissioning::turn_by_hand, &Commissioning::drive_pulse,
                           &Commissioning::pull_cable, &Commissioning::brake_pulse}) {
     const CommissioningResult result = (this->*step)();
-    if (result != CommissioningResult::passed) return unless_stopped(result);
+    if (result != CommissioningResult::passed) return stop_requested_() ? CommissioningResult::interrupted : result;
   }
   const driver::IoResult result = driver_.deactivate();
   if (!result.ok()) {
@@ -125,7 +120,7 @@ CommissioningResult Commissioning::read_board() {
   return CommissioningResult::passed;
 }
 
-bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
+bool Commissioning::judge_turn(Wheel wheel, const WheelCounts& travel) {
   const bool upper = wheel == Wheel::upper;
   const std::string board(driver_.name());
   const std::int32_t turned = upper ? travel.upper : travel.lower;
@@ -202,8 +197,7 @@ CommissioningResult Commissioning::turn_by_hand() {
     }
     clock_.sleep_until(clock_.now_ns() + watch_ns);  // an emulated wheel jumps: the driver doubts a jump in less time
     if (!read_fresh(after)) return CommissioningResult::failed;
-    const Travel travel{.upper = rig::counts_between(before.upper_counts, after.upper_counts),
-                        .lower = rig::counts_between(before.lower_counts, after.lower_counts)};
+    const WheelCounts travel = travel_between(before, after);
     if (!judge_turn(wheel, travel)) return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
@@ -227,11 +221,11 @@ bool Commissioning::drive(const rig::Command& command, std::int64_t end_ns) {
   return true;
 }
 
-bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel& travel) {
+bool Commissioning::pulse(const rig::Command& command, WheelCounts& travel) {
   rig::Measurement first;
   rig::Measurement now;
   guard_.begin();
-  bool good = read_fresh(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
+  bool good = read_fresh(first) && drive(command, clock_.now_ns() + std::llround(pulse_s / rig::s_per_ns));
   // A driver that failed has already made its outputs safe; it reports the result again.
   const bool active = driver_.state() == driver::DriverState::active;
   driver::IoResult ended = active ? driver_.write(rig::safe_command) : driver_.deactivate();
@@ -242,15 +236,14 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
     good = false;
   }
   if (!good || !read_fresh(now)) return false;
-  travel = {.upper = rig::counts_between(first.upper_counts, now.upper_counts),
-            .lower = rig::counts_between(first.lower_counts, now.lower_counts)};
+  travel = travel_between(first, now);
   return true;
 }
 
 bool Commissioning::wait_for_standstill() {
   rig::Measurement last;
   if (!read_fresh(last)) return false;
-  const std::int64_t limit_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
+  const std::int64_t limit_ns = clock_.now_ns() + std::llround(run_out_limit_s / rig::s_per_ns);
   std::int64_t still_since_ns = clock_.now_ns();
   while (clock_.now_ns() - still_since_ns < standstill_ns) {
     if (stop_requested_()) return false;
@@ -272,11 +265,11 @@ bool Commissioning::wait_for_standstill() {
 CommissioningResult Commissioning::drive_pulse() {
   if (!agrees(step(3) + formatted("the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
                                   "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
-                                  options_.drive_duty, options_.drive_pulse_s))) {
+                                  options_.drive_duty, pulse_s))) {
     return CommissioningResult::declined;
   }
-  Travel travel;
-  if (!pulse({.motor_duty = options_.drive_duty, .motor_enable = true}, options_.drive_pulse_s, travel)) {
+  WheelCounts travel;
+  if (!pulse({.motor_duty = options_.drive_duty, .motor_enable = true}, travel)) {
     return CommissioningResult::failed;
   }
   if (stop_requested_()) return CommissioningResult::interrupted;
@@ -298,11 +291,11 @@ CommissioningResult Commissioning::brake_pulse() {
           formatted("the upper wheel stands and its brake gets duty %.2f for %.2f s, then once more while "
                     "the program sends nothing for %.2f s, to see whether the board holds its outputs. Keep your hands "
                     "away from it. Go on?",
-                    options_.brake_duty, options_.brake_pulse_s, options_.silence_s))) {
+                    options_.brake_duty, pulse_s, silence_s))) {
     return CommissioningResult::declined;
   }
-  Travel travel;
-  if (!pulse({.brake_duty = options_.brake_duty}, options_.brake_pulse_s, travel)) return CommissioningResult::failed;
+  WheelCounts travel;
+  if (!pulse({.brake_duty = options_.brake_duty}, travel)) return CommissioningResult::failed;
   if (stop_requested_()) return CommissioningResult::interrupted;
   if (std::abs(travel.upper) > still_counts || std::abs(travel.lower) > still_counts) {
     dialog_.tell(
@@ -313,7 +306,7 @@ CommissioningResult Commissioning::brake_pulse() {
   }
   if (!measure_outputs()) return CommissioningResult::failed;
   if (stop_requested_()) return CommissioningResult::interrupted;
-  dialog_.tell("ok: " + output_text());
+  dialog_.tell("ok: " + in_words(output_times_));
   return is_seen(options_.emulated
                      ? "Did the emulated brake grip and release? Nobody can see or hear it: look at the column "
                        "brake_torque_Nm of the emulator's --truth file."
@@ -331,7 +324,7 @@ CommissioningResult Commissioning::is_seen(const std::string& question, const ch
 
 void Commissioning::watch_silence() {
   const std::int64_t silent_since_ns = clock_.now_ns();
-  const std::int64_t end_ns = silent_since_ns + std::llround(options_.silence_s / rig::s_per_ns);
+  const std::int64_t end_ns = silent_since_ns + std::llround(silence_s / rig::s_per_ns);
   const auto silent_ms = [&] { return static_cast<double>(clock_.now_ns() - silent_since_ns) / rig::ns_per_ms; };
   rig::Command applied;
   while (clock_.now_ns() < end_ns && !stop_requested_() && guard_.beat()) {
@@ -358,17 +351,6 @@ bool Commissioning::measure_outputs() {
   guard_.end(ended.ok());
   if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + reason_and_error(ended));
   return driven && ended.ok();
-}
-
-std::string Commissioning::output_text() const {
-  const OutputTimes& times = output_times_;
-  if (!times.reported) return "this board does not report its outputs: its watchdog and its release were not measured";
-  const std::string watchdog =
-      times.watchdog_ms
-          ? formatted("without commands the board ends its outputs by itself after %.1f ms", *times.watchdog_ms)
-          : formatted("without commands the board HOLDS its outputs, for %.0f ms at least: it has no watchdog",
-                      times.watched_ms);
-  return watchdog + formatted("; the safe state was verified %.3f ms after its order", times.release_ms.value_or(0.0));
 }
 
 }  // namespace abs_hil::experiment

@@ -51,16 +51,15 @@ class PulseGuard {
 /// Pulses of the commissioning; their limits keep the rig from running away.
 struct CommissioningOptions {
   double drive_duty{0.15};                    ///< in (0, 0.3]
-  double drive_pulse_s{0.3};                  ///< in (0, 1]
   double brake_duty{0.5};                     ///< in (0, 0.7]; the brake grips above its dead zone of 0.415
-  double brake_pulse_s{0.3};                  ///< in (0, 1]
-  double silence_s{0.3};                      ///< in (0, 1]: how long the program then sends nothing, the brake on
-  double run_out_limit_s{60.0};               ///< longest wait for standstill, > 0
   std::int32_t encoder_counts_per_rev{4096};  ///< model.encoder_counts_per_rev, > 0: what one turn must give
   bool emulated{false};                       ///< the board is an emulator's: its brake can be neither seen nor heard
 };
 
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
+
+/// What the wheels have moved by from one measurement to the other.
+[[nodiscard]] WheelCounts travel_between(const rig::Measurement& before, const rig::Measurement& after) noexcept;
 
 /// An error as a run names it: the backend's own reason, if it has one, and the error.
 [[nodiscard]] std::string reason_and_error(const driver::IoResult& result);
@@ -79,18 +78,17 @@ class Commissioning {
   /// What the last step has measured.
   [[nodiscard]] const OutputTimes& output_times() const noexcept { return output_times_; }
   /// What turning by hand has given.
-  [[nodiscard]] const TurnCounts& one_turn() const noexcept { return one_turn_; }
+  [[nodiscard]] const WheelCounts& one_turn() const noexcept { return one_turn_; }
 
  private:
   static constexpr std::int64_t cycle_ns = 1'000'000;
+  static constexpr double pulse_s = 0.3;
+  static constexpr double silence_s = 0.3;         ///< how long the program then sends nothing, the brake on
+  static constexpr double run_out_limit_s = 60.0;  ///< longest wait for standstill
   /// Largest movement of a wheel that nobody touches and nothing drives.
   static constexpr std::int32_t still_counts = 64;
 
   enum class Wheel : std::uint8_t { upper, lower };
-  struct Travel {
-    std::int32_t upper{0};
-    std::int32_t lower{0};
-  };
 
   [[nodiscard]] CommissioningResult read_board();
   [[nodiscard]] CommissioningResult turn_by_hand();
@@ -99,7 +97,7 @@ class Commissioning {
   /// polarity too, because then the pins are pulled high.
   [[nodiscard]] CommissioningResult pull_cable();
   [[nodiscard]] CommissioningResult brake_pulse();
-  [[nodiscard]] bool judge_turn(Wheel wheel, const Travel& travel);
+  [[nodiscard]] bool judge_turn(Wheel wheel, const WheelCounts& travel);
   /// Asks for consent to a step.
   [[nodiscard]] bool agrees(const std::string& question) { return dialog_.ask(question) == Answer::yes; }
   /// Asks what only a person can see; tells the fix if it was not seen.
@@ -107,20 +105,18 @@ class Commissioning {
   [[nodiscard]] bool read(rig::Measurement& measurement);
   /// The same for a decision: not a measurement from before this call, which a driver repeats when an answer is lost.
   [[nodiscard]] bool read_fresh(rig::Measurement& measurement);
-  [[nodiscard]] bool pulse(const rig::Command& command, double duration_s, Travel& travel);
+  [[nodiscard]] bool pulse(const rig::Command& command, WheelCounts& travel);
   [[nodiscard]] bool drive(const rig::Command& command, std::int64_t end_ns);
   /// Drives until the board is silent; `before` are then the speeds of the wheels, counts/s.
-  [[nodiscard]] bool drive_until_silent(Travel& before);
+  [[nodiscard]] bool drive_until_silent(WheelCounts& before);
   [[nodiscard]] bool await_board();
-  [[nodiscard]] bool counts_in_0_1_s(Travel& travel);
+  [[nodiscard]] bool counts_in_0_1_s(WheelCounts& travel);
   [[nodiscard]] bool activate_and_rest();
   [[nodiscard]] std::string step(int number) const;
   [[nodiscard]] bool wait_for_standstill();
   /// Falls silent with the brake on and sees what the board does by itself; then measures how soon it is safe.
   [[nodiscard]] bool measure_outputs();
   void watch_silence();
-  [[nodiscard]] std::string output_text() const;
-  [[nodiscard]] CommissioningResult unless_stopped(CommissioningResult result) const;
 
   driver::RigDriver& driver_;
   runtime::Clock& clock_;
@@ -129,7 +125,7 @@ class Commissioning {
   CommissioningOptions options_;
   std::function<bool()> stop_requested_;
   OutputTimes output_times_{};
-  TurnCounts one_turn_{};
+  WheelCounts one_turn_{};
 };
 
 }  // namespace abs_hil::experiment

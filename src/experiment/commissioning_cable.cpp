@@ -4,14 +4,13 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "experiment/commissioning.hpp"
-#include "rig/encoder_scale.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::experiment {
 
 using rig::formatted;
 
-bool Commissioning::drive_until_silent(Travel& before) {
+bool Commissioning::drive_until_silent(WheelCounts& before) {
   constexpr std::int64_t longest_ns = 30 * rig::ns_per_s;
   constexpr std::int64_t window_ns = rig::ns_per_s / 10;
   rig::Measurement now;
@@ -32,8 +31,7 @@ bool Commissioning::drive_until_silent(Travel& before) {
       return false;
     }
     if (now.time_ns - mark.time_ns < window_ns) continue;
-    before = {.upper = rig::counts_between(mark.upper_counts, now.upper_counts),
-              .lower = rig::counts_between(mark.lower_counts, now.lower_counts)};
+    before = travel_between(mark, now);
     mark = now;
   }
   if (!stop_requested_()) dialog_.tell("FAILED: the cable was not pulled, or the board works without it");
@@ -42,7 +40,7 @@ bool Commissioning::drive_until_silent(Travel& before) {
 
 bool Commissioning::await_board() {
   rig::Measurement ignored;
-  const std::int64_t end_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
+  const std::int64_t end_ns = clock_.now_ns() + std::llround(run_out_limit_s / rig::s_per_ns);
   for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
     clock_.sleep_until(tick_ns);
     if (!guard_.beat()) return false;
@@ -52,14 +50,13 @@ bool Commissioning::await_board() {
   return false;
 }
 
-bool Commissioning::counts_in_0_1_s(Travel& travel) {
+bool Commissioning::counts_in_0_1_s(WheelCounts& travel) {
   rig::Measurement first;
   rig::Measurement last;
   if (!read_fresh(first)) return false;
   clock_.sleep_until(clock_.now_ns() + rig::ns_per_s / 10);
   if (!read_fresh(last)) return false;
-  travel = {.upper = rig::counts_between(first.upper_counts, last.upper_counts),
-            .lower = rig::counts_between(first.lower_counts, last.lower_counts)};
+  travel = travel_between(first, last);
   return true;
 }
 
@@ -75,14 +72,14 @@ CommissioningResult Commissioning::pull_cable() {
   }
   guard_.begin();
   dialog_.tell("Pull the " + cable + " now, at the board. Plug it in again after a second or two.");
-  Travel before;
+  WheelCounts before;
   const bool back = drive_until_silent(before) && await_board();
   const driver::IoResult ended = driver_.deactivate();
   guard_.end(ended.ok());
   if (stop_requested_()) return CommissioningResult::interrupted;
   if (!back || !ended.ok()) return CommissioningResult::failed;
   driver_.configure();
-  Travel after;
+  WheelCounts after;
   if (!activate_and_rest() || !counts_in_0_1_s(after)) return CommissioningResult::failed;
   if (after.lower > before.lower + still_counts / 4) {
     dialog_.tell(

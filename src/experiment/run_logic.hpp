@@ -69,14 +69,13 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
   /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics. Its caps
   /// are duties that the driver can send, so that no rounding exceeds them.
-  [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
+  /// @param checks_wheels  it judges the motion of the wheels
+  [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options,
+                                               bool checks_wheels = true) const noexcept {
     return runtime::CommandGate(options, sequence_.permissions(),
-                                runtime::plausibility_limits(identity_, ideal_actuator_, options), identity_.brake.u0,
-                                sendable(options));
-  }
-  /// The same gate, but it does not judge the motion of the wheels.
-  [[nodiscard]] runtime::CommandGate make_gate_without_wheels(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(options, sequence_.permissions(), {}, identity_.brake.u0, sendable(options));
+                                checks_wheels ? runtime::plausibility_limits(identity_, ideal_actuator_, options)
+                                              : runtime::PlausibilityLimits{},
+                                identity_.brake.u0, sendable(options));
   }
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }

@@ -354,13 +354,9 @@ int serve(int argc, const char* const* argv) {
   cli::Parser program("abs_guardian", "The guardian of the rig's outputs");
   cli::Parser parser = program.add_subcommand(
       "serve", "The resident guardian: keeps the board's outputs at zero and grants them to one run at a time");
-  parser.add(
-      {.names = "--socket", .to = &options.socket, .help = "where it grants leases (guardian.socket)", .type = "PATH"});
-  parser.add({.names = "--config", .to = &options.config_file, .help = "configuration file", .type = "FILE"});
-  parser.add({.names = "--set",
-              .to = &options.assignments,
-              .help = "any configuration value, for example driver.kind=can",
-              .repeated = true});
+  parser.add("--socket", &options.socket, "where it grants leases (guardian.socket)", {.type = "PATH"});
+  parser.add("--config", &options.config_file, "configuration file", {.type = "FILE"});
+  parser.add("--set", &options.assignments, "any configuration value, for example driver.kind=can", {.repeated = true});
   if (const auto status = program.parse(argc, argv)) return *status;
   ignore_signals({SIGHUP, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ});
   spare_from_oom();

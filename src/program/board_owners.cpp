@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <csignal>
 #include <memory>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
 #include "program/zero_writing.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
@@ -96,14 +96,13 @@ std::vector<BoardOwner> owners_of(const std::vector<std::vector<std::string>>& f
   if (wanted.empty() || !proc) return owners;
   while (const dirent* entry = ::readdir(proc.get())) {
     const std::string number = entry->d_name;
-    pid_t pid = 0;
-    const auto [rest, wrong] = std::from_chars(number.data(), number.data() + number.size(), pid);
-    if (wrong != std::errc() || rest != number.data() + number.size() || pid == ::getpid()) continue;
+    const auto pid = rig::parse_number<pid_t>(number);
+    if (!pid || *pid == ::getpid()) continue;
     const auto board = board_of(::dirfd(proc.get()), number, wanted);
     if (!board) continue;
     std::string name = text_of(::dirfd(proc.get()), number + "/comm");
     if (name.ends_with('\n')) name.pop_back();
-    if (name != "abs_guardian") owners.push_back({.pid = pid, .name = name, .board = *board});
+    if (name != "abs_guardian") owners.push_back({.pid = *pid, .name = name, .board = *board});
   }
   return owners;
 }

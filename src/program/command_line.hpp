@@ -43,6 +43,14 @@ struct RunRequest : config::Configuration {
   std::function<void()> stop_was_sent{};
 };
 
+/// True if the run takes commands over LCM.
+[[nodiscard]] bool hears_commands(const RunRequest& request);
+/// True if stdin is a terminal.
+[[nodiscard]] bool at_terminal() noexcept;
+/// Refuses a run whose questions nobody could answer, or that would move a rig without a person's answer. Throws
+/// config::ConfigError.
+void check_questions(const RunRequest& request);
+
 /// No result of this process may replace a file that these name.
 void keep_inputs(const config::Sources& sources);
 

@@ -226,14 +226,8 @@ struct CommissionOptions {
 Action add_commission(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<CommissionOptions>();
   add_configuration_options(parser, o->sources);
-  parser.add({.names = "--drive-duty",
-              .to = &o->pulses.drive_duty,
-              .help = "duty of the drive pulse, in (0, 0.3]",
-              .show_default = true});
-  parser.add({.names = "--brake-duty",
-              .to = &o->pulses.brake_duty,
-              .help = "duty of the brake pulse, in (0, 0.7]",
-              .show_default = true});
+  parser.add("--drive-duty", &o->pulses.drive_duty, "duty of the drive pulse, in (0, 0.3]", {.show_default = true});
+  parser.add("--brake-duty", &o->pulses.brake_duty, "duty of the brake pulse, in (0, 0.7]", {.show_default = true});
   return [o] { return commission(config::merge(o->sources), o->pulses); };
 }
 

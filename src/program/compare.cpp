@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cctype>
 #include <memory>
 
 #include "config/config_error.hpp"
@@ -12,6 +11,7 @@
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "study/comparison.hpp"
 #include "study/parallel.hpp"
 
@@ -34,13 +34,6 @@ struct CompareOptions {
   std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
   std::optional<std::string> run_folder{};  ///< --out: its folder
 };
-
-/// A controller's heading as the name of a folder.
-std::string folder_name(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_' && c != '.' && c != '='; }, '_');
-  return name;
-}
 
 /// Opens a result file. Called before the runs, so that a bad path is reported at once.
 std::unique_ptr<files::ResultFile> open(const std::optional<std::string>& path) try {
@@ -70,7 +63,7 @@ int record(const CompareOptions& options, const study::Study& study, const std::
   int status = exit_completed;
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     std::optional<std::string> folder = options.run_folder;
-    if (folder && contenders.size() > 1) *folder += '/' + folder_name(contenders[c].name);
+    if (folder && contenders.size() > 1) *folder += '/' + rig::plain_name(contenders[c].name, "-_.=");
     status = std::max(status, record_run(study, repetition * contenders.size() + c, folder, command_line));
   }
   return status;
@@ -122,48 +115,30 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
 Action add_compare(cli::Parser& compare, const Words& words) {
   const auto options = std::make_shared<CompareOptions>();
   CompareOptions& o = *options;
-  compare.add({.names = "--plant", .to = &o.sources.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
-  compare.add({.names = "--model",
-               .to = &o.sources.model,
-               .help = "every controller's model (default: the plant, before it varies)",
-               .type = "NAME|FILE"});
-  compare.add({.names = "--controllers,--controller",
-               .to = &o.controllers,
-               .help = "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
-                       "LABEL= before it if you like; or all",
-               .type = "A,B,...",
-               .show_default = true});
-  compare.add({.names = "--repeat",
-               .to = &o.repeat,
-               .help = "runs of each controller",
-               .type = "N",
-               .range = {1, 1'000'000},
-               .show_default = true});
-  compare.add(
-      {.names = "--seed", .to = &o.seed, .help = "seed of the varied plants", .type = "N", .show_default = true});
-  compare.add({.names = "--vary",
-               .to = &o.vary,
-               .help = "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
-               .type = "SPEC",
-               .default_text = "parameters=0.1,theta=0.1,phase"});
+  compare.add("--plant", &o.sources.plant, "plant by name or TOML file", {.type = "NAME|FILE"});
+  compare.add("--model", &o.sources.model, "every controller's model (default: the plant, before it varies)",
+              {.type = "NAME|FILE"});
+  compare.add("--controllers,--controller", &o.controllers,
+              "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
+              "LABEL= before it if you like; or all",
+              {.type = "A,B,...", .show_default = true});
+  compare.add("--repeat", &o.repeat, "runs of each controller",
+              {.type = "N", .range = {1, 1'000'000}, .show_default = true});
+  compare.add("--seed", &o.seed, "seed of the varied plants", {.type = "N", .show_default = true});
+  compare.add("--vary", &o.vary, "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
+              {.type = "SPEC", .default_text = "parameters=0.1,theta=0.1,phase"});
   add_config_file(compare, o.sources);
   add_assignments(compare, o.sources);
   add_threads(compare, o.threads);
-  compare.add({.names = "--json", .to = &o.json_file, .help = "write the table as JSON", .type = "FILE"});
-  compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
-  compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});
-  compare.add({.names = "--runs", .to = &o.runs_file, .help = "write each run's results as CSV", .type = "FILE"});
-  compare.add({.names = "--run",
-               .to = &o.recorded_run,
-               .help = "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
-               .type = "K",
-               .range = {0, 999'999},
-               .excludes = {"--json", "--csv", "--markdown", "--runs"}});
-  compare.add({.names = "--out",
-               .to = &o.run_folder,
-               .help = "run folder of --run; with several controllers one below it for each",
-               .type = "DIR",
-               .needs = {"--run"}});
+  compare.add("--json", &o.json_file, "write the table as JSON", {.type = "FILE"});
+  compare.add("--csv", &o.csv_file, "write the table as CSV", {.type = "FILE"});
+  compare.add("--markdown", &o.markdown_file, "write the table as Markdown", {.type = "FILE"});
+  compare.add("--runs", &o.runs_file, "write each run's results as CSV", {.type = "FILE"});
+  compare.add("--run", &o.recorded_run,
+              "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
+              {.type = "K", .range = {0, 999'999}, .excludes = {"--json", "--csv", "--markdown", "--runs"}});
+  compare.add("--out", &o.run_folder, "run folder of --run; with several controllers one below it for each",
+              {.type = "DIR", .needs = {"--run"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
   return [options, words] { return compare_controllers(*options, words); };
 }

@@ -91,8 +91,8 @@ Action add_doctor(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<DoctorOptions>();
   add_backend_option(parser, o->sources);
   add_configuration_options(parser, o->sources);
-  parser.add({.names = "--only", .to = &o->only, .help = "run only this check", .one_of = diagnosis::check_names()});
-  parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
+  parser.add("--only", &o->only, "run only this check", {.one_of = diagnosis::check_names()});
+  parser.add("--json", &o->json, "print JSON instead of text");
   return [o] { return doctor(config::merged_settings(o->sources), o->only, o->json); };
 }
 

@@ -14,7 +14,7 @@
 #include "abs_hil/rig/reason.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "driver/factory.hpp"
 #include "program/subcommands.hpp"
 
@@ -23,8 +23,6 @@ namespace abs_hil::program {
 namespace {
 
 using Json = nlohmann::ordered_json;  // keeps the order of insertion
-
-void print_json(const Json& rows) { fmt::print("{}\n", rows.dump(1)); }
 
 std::string_view name_of(rig::Topic topic) {
   switch (topic) {
@@ -108,52 +106,51 @@ std::string valid_of(const config::Key& key) {
 /// How the key bears on the safety of a run on a board.
 std::string class_of(const config::Key& key) { return config::safety_of(key).in_words(key.unit); }
 
-void list_keys(bool json) {
+/// Calls `visit` with each key of the configuration, which has its default.
+template <class Visit>
+void for_each_key(const Visit& visit) {
   config::Settings settings;
   const config::KeyTable table(settings);
-  std::size_t name_width = 0, value_width = 0;
-  if (json) {
-    Json rows = Json::array();
-    for (const config::Key& key : table.keys()) {
-      rows.push_back({{"name", key.name},
-                      {"value", config::value_text(key)},
-                      {"valid", valid_of(key)},
-                      {"unit", key.unit},
-                      {"meaning", key.meaning},
-                      {"safety", class_of(key)}});
-    }
-    print_json(rows);
-    return;
-  }
-  for (const config::Key& key : table.keys()) {
-    name_width = std::max(name_width, key.name.size());
-    value_width = std::max(value_width, config::value_text(key).size());
-  }
-  for (const config::Key& key : table.keys()) {
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, config::value_text(key), value_width,
-               valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning,
-               config::safety_of(key).kind != rig::SafetyClass::Kind::none ? fmt::format(" [{}]", class_of(key)) : "");
-  }
+  std::ranges::for_each(table.keys(), visit);
 }
 
-void list_quantities(bool json) {
-  const Json rows = quantities();
-  if (json) {
-    print_json(rows);
-    return;
-  }
+std::string text_of_value(const config::Key& key) { return config::text_of(config::value_of(key)); }
+
+Json keys() {
+  Json rows = Json::array();
+  for_each_key([&rows](const config::Key& key) {
+    rows.push_back({{"name", key.name},
+                    {"value", text_of_value(key)},
+                    {"valid", valid_of(key)},
+                    {"unit", key.unit},
+                    {"meaning", key.meaning},
+                    {"safety", class_of(key)}});
+  });
+  return rows;
+}
+
+void list_keys() {
+  std::size_t name_width = 0, value_width = 0;
+  for_each_key([&](const config::Key& key) {
+    name_width = std::max(name_width, key.name.size());
+    value_width = std::max(value_width, text_of_value(key).size());
+  });
+  for_each_key([&](const config::Key& key) {
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, text_of_value(key), value_width, valid_of(key),
+               key.unit.empty() ? "" : " ", key.unit, key.meaning,
+               config::safety_of(key).kind != rig::SafetyClass::Kind::none ? fmt::format(" [{}]", class_of(key)) : "");
+  });
+}
+
+void list_quantities() {
   fmt::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
-  for (const Json& row : rows) {
+  for (const Json& row : quantities()) {
     fmt::print("{:<24}  {:<15}  {:>3}  {}\n", row["name"].get<std::string>(), row["unit"].get<std::string>(),
                row["csv_column"].is_null() ? "" : row["csv_column"].dump(), row["meaning"].get<std::string>());
   }
 }
 
-void list_reasons(bool json) {
-  if (json) {
-    print_json(reasons());
-    return;
-  }
+void list_reasons() {
   fmt::print("{:>6}  {:<12}  {:<32}  {}\n", "number", "kind", "found again by replay", "reason");
   for (const rig::ReasonRow& row : rig::reasons) {
     fmt::print("{:>6}  {:<12}  {:<32}  {}\n", static_cast<std::uint16_t>(row.reason), rig::name_of(row.kind),
@@ -186,27 +183,24 @@ struct ListOptions {
 
 Action add_list(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ListOptions>();
-  parser.add(
-      {.names = "--keys", .to = &o->keys, .help = "list all configuration values with unit, range and safety class"});
-  parser.add({.names = "--quantities",
-              .to = &o->quantities,
-              .help = "list the quantities of a CSV row and of ABS_TELEMETRY",
-              .excludes = {"--keys"}});
-  parser.add({.names = "--reasons",
-              .to = &o->reasons,
-              .help = "list the reasons of phase changes, ends of runs and refused commands",
-              .excludes = {"--keys", "--quantities"}});
-  parser.add({.names = "--json", .to = &o->json, .help = "print keys, quantities or reasons as JSON"});
+  parser.add("--keys", &o->keys, "list all configuration values with unit, range and safety class");
+  parser.add("--quantities", &o->quantities, "list the quantities of a CSV row and of ABS_TELEMETRY",
+             {.excludes = {"--keys"}});
+  parser.add("--reasons", &o->reasons, "list the reasons of phase changes, ends of runs and refused commands",
+             {.excludes = {"--keys", "--quantities"}});
+  parser.add("--json", &o->json, "print keys, quantities or reasons as JSON");
   return [o, parser] {
     if (o->json && !o->quantities && !o->reasons && !o->keys) {
       return parser.refuse("--json requires --keys, --quantities or --reasons");
     }
-    if (o->quantities) {
-      list_quantities(o->json);
+    if (o->json) {
+      fmt::print("{}\n", (o->quantities ? quantities() : o->reasons ? reasons() : keys()).dump(1));
+    } else if (o->quantities) {
+      list_quantities();
     } else if (o->reasons) {
-      list_reasons(o->json);
+      list_reasons();
     } else if (o->keys) {
-      list_keys(o->json);
+      list_keys();
     } else {
       list_names();
     }

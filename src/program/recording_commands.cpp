@@ -110,38 +110,22 @@ int convert(const ConvertCommand& command) {
 
 Action add_replay(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ReplayCommand>();
-  parser.add({.names = "recording",
-              .to = &o->recording,
-              .help = "event log (--log), or a run folder (--out)",
-              .type = "LOG",
-              .required = true});
-  parser.add({.names = "--check",
-              .to = &o->check,
-              .help = "run the recorded configuration again and check that all commands are bit-equal"});
-  parser.add({.names = "--controller,--controllers",
-              .to = &o->controller,
-              .help = "use another slip controller",
-              .type = "NAME",
-              .excludes = {"--check"}});
-  parser.add({.names = "--set",
-              .to = &o->assignments,
-              .help = "change a recorded configuration value",
-              .type = "key=value",
-              .repeated = true,
-              .excludes = {"--check"}});
-  parser.add({.names = "--csv",
-              .to = &o->csv_file,
-              .help = "write the replayed commands, with the columns of a run's CSV",
-              .type = "FILE",
-              .excludes = {"--check"}});
+  parser.add("recording", &o->recording, "event log (--log), or a run folder (--out)",
+             {.type = "LOG", .required = true});
+  parser.add("--check", &o->check, "run the recorded configuration again and check that all commands are bit-equal");
+  parser.add("--controller,--controllers", &o->controller, "use another slip controller",
+             {.type = "NAME", .excludes = {"--check"}});
+  parser.add("--set", &o->assignments, "change a recorded configuration value",
+             {.type = "key=value", .repeated = true, .excludes = {"--check"}});
+  parser.add("--csv", &o->csv_file, "write the replayed commands, with the columns of a run's CSV",
+             {.type = "FILE", .excludes = {"--check"}});
   return [o] { return replay_run(*o); };
 }
 
 Action add_convert(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ConvertCommand>();
-  parser.add({.names = "from", .to = &o->from, .help = "event log or run folder", .type = "IN", .required = true});
-  parser.add(
-      {.names = "to", .to = &o->to, .help = "FILE.csv, FILE.mcap or FILE.parquet", .type = "OUT", .required = true});
+  parser.add("from", &o->from, "event log or run folder", {.type = "IN", .required = true});
+  parser.add("to", &o->to, "FILE.csv, FILE.mcap or FILE.parquet", {.type = "OUT", .required = true});
   return [o] { return convert(*o); };
 }
 

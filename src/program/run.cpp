@@ -2,12 +2,17 @@
 #include "run/run.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <spdlog/spdlog.h>
+#include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -18,8 +23,7 @@
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
 #include "guardian/guardian_lease.hpp"
-#include "program/foreign_run.hpp"
-#include "program/questions.hpp"
+#include "interchange/foreign_controller.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
 #include "program/signals.hpp"
@@ -51,6 +55,127 @@ void log_board_notes(const config::Settings& s, const driver::RigDriver& driver)
   for (const std::string& note : driver.notes()) spdlog::info("{}", note);
   if (const std::string note = driver::verification_note(s.driver); !note.empty()) spdlog::warn("{}", note);
 }
+
+/// A run's controller that comes from a file, if it does: where it runs, its trial, its part of the summary.
+class ForeignRun {
+ public:
+  /// Decides where the code will run. Call it before the controller is made.
+  explicit ForeignRun(bool on_rig) : on_rig_(on_rig) {
+    interchange::set_home(on_rig ? interchange::Home::this_process : interchange::Home::own_process);
+  }
+
+  /// Takes note of the controller, which must outlive this object. With `try_out` tries it out for a run in real time,
+  /// and logs what real-time code must not do. Throws std::invalid_argument if it cannot run at this rate.
+  void look_at(control::SlipController& controller, bool try_out) {
+    controller_ = dynamic_cast<interchange::ForeignController*>(&controller);
+    if (controller_ == nullptr) return;
+    sha256_ = run_folder::sha256_of_file(controller_->source());
+    if (try_out) log_trial(trial_.emplace(controller_->try_out()));
+  }
+
+  /// For the summary; null if the controller does not come from a file.
+  [[nodiscard]] nlohmann::ordered_json summary() const {
+    if (controller_ == nullptr) return nullptr;
+    const rig::DurationQuantiles steps = controller_->step_times().summary();
+    nlohmann::ordered_json json{{"file", controller_->file()},
+                                {"sha256", sha256_},
+                                {"own_process", !on_rig_},
+                                {"steps", controller_->step_times().count()},
+                                {"step_us",
+                                 {{"p50", steps.p50_us},
+                                  {"p99", steps.p99_us},
+                                  {"p99_9", steps.p99_9_us},
+                                  {"max", us(controller_->step_times().max_ns())}}}};
+    if (trial_) {
+      json["trial"] = {{"steps", trial_->times.steps},
+                       {"step_us",
+                        {{"p50", us(trial_->times.median_ns)},
+                         {"p99", us(trial_->times.p99_ns)},
+                         {"max", us(trial_->times.worst_ns)}}},
+                       {"allocations", trial_->offences.allocations},
+                       {"system_calls", trial_->offences.system_calls},
+                       {"died_without_system_calls", trial_->died_without_system}};
+    }
+    if (const std::string why = controller_->failure(); !why.empty()) json["failure"] = why;
+    return json;
+  }
+
+ private:
+  static double us(std::int64_t duration_ns) { return 1e-3 * static_cast<double>(duration_ns); }
+
+  void log_trial(const interchange::ForeignTrial& trial) const {
+    const interchange::Offences& found = trial.offences;
+    if (found.allocations > 0) {
+      spdlog::warn("controller {}: {} allocations in {} trial steps: an allocation can wait for a lock",
+                   controller_->file(), found.allocations, trial.times.steps);
+    }
+    if (found.system_calls > 0) {
+      spdlog::warn(
+          "controller {}: {} system calls in {} trial steps, the first one number {}: the kernel can delay them",
+          controller_->file(), found.system_calls, trial.times.steps, found.first_system_call);
+    }
+    if (trial.died_without_system) {
+      spdlog::warn(
+          "controller {}: it died in a trial in which its system calls failed: it needs them, and the kernel can "
+          "delay them",
+          controller_->file());
+    }
+    spdlog::info("controller {}: steps took {:.1f} us at most in a trial of {}", controller_->file(),
+                 us(trial.times.worst_ns), trial.times.steps);
+  }
+
+  bool on_rig_;
+  interchange::ForeignController* controller_{nullptr};
+  std::string sha256_{};
+  std::optional<interchange::ForeignTrial> trial_{};
+};
+
+/// Puts the questions of a run's phases to the terminal and hands Enter to the run. For the slow thread.
+class Questions {
+ public:
+  /// @param run  must outlive it
+  Questions(const RunRequest& request, run::Run& run)
+      : run_(run),
+        by_person_(request.settings.experiment.answers == experiment::answers_person),
+        commands_(hears_commands(request)) {
+    if (by_person_ || !config::asks(*request.script) || request.in_series) return;
+    spdlog::info("the simulation answers the questions of experiment {} itself, at once", request.script->name);
+  }
+
+  /// Call it every few milliseconds. Never waits.
+  void poll() {
+    if (!by_person_) return;
+    const rig::CycleRecord& latest = run_.latest();
+    const std::string_view question = run_.names().question_of(latest);
+    if (question.empty()) {
+      asked_ = -1;
+    } else if (asked_ != latest.phase_index) {
+      asked_ = latest.phase_index;
+      // An Enter from before answers nothing.
+      if (terminal_) static_cast<void>(::tcflush(STDIN_FILENO, TCIFLUSH));
+      fmt::print(stderr, "\n{}{}\n", question, commands_ ? " (or: abs_hil send continue)" : "");
+      std::fflush(stderr);
+    } else if (terminal_ && entered()) {
+      static_cast<void>(run_.adjustments().put({.kind = experiment::Adjustment::Kind::answer}));
+    }
+  }
+
+ private:
+  [[nodiscard]] bool entered() {
+    pollfd ready{STDIN_FILENO, POLLIN, 0};
+    if (::poll(&ready, 1, 0) <= 0 || (ready.revents & POLLIN) == 0) return false;
+    std::array<char, 256> line{};
+    const ssize_t size = ::read(STDIN_FILENO, line.data(), line.size());
+    terminal_ = size > 0;  // otherwise it was closed
+    return terminal_ && std::find(line.begin(), line.begin() + size, '\n') != line.begin() + size;
+  }
+
+  run::Run& run_;
+  bool by_person_;
+  bool commands_;
+  bool terminal_{at_terminal()};
+  int asked_{-1};  ///< index of the phase whose question stands; -1: none
+};
 
 /// Logs messages about the timing of a run in real time.
 class TimingMessages {

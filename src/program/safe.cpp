@@ -347,21 +347,11 @@ int make_boards_safe(const SafeCommand& command) {
 
 Action add_safe(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<SafeCommand>();
-  parser.add({.names = "--config",
-              .to = &o->sources.config_file,
-              .help = "TOML file whose table [driver] names the board",
-              .type = "FILE"});
-  parser.add({.names = "--set",
-              .to = &o->sources.assignments,
-              .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
-              .type = "key=value",
-              .repeated = true});
-  parser.add({.names = "--insist",
-              .to = &o->insist_s,
-              .help = "how long to try to verify the safe state, s",
-              .type = "S",
-              .range = {0.0, most_insist_s},
-              .show_default = true});
+  parser.add("--config", &o->sources.config_file, "TOML file whose table [driver] names the board", {.type = "FILE"});
+  parser.add("--set", &o->sources.assignments, "set a value of driver., or guardian.socket (abs_hil list --keys)",
+             {.type = "key=value", .repeated = true});
+  parser.add("--insist", &o->insist_s, "how long to try to verify the safe state, s",
+             {.type = "S", .range = {0.0, most_insist_s}, .show_default = true});
   return [o] { return make_boards_safe(*o); };
 }
 

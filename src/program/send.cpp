@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <charconv>
 #include <memory>
 
 #include "commands/sender.hpp"
 #include "config/config_error.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -15,12 +15,8 @@ namespace abs_hil::program {
 namespace {
 
 double number_of(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) {
-    throw config::ConfigError("send: '" + text + "' is not a number; give a decimal number");
-  }
-  return value;
+  if (const auto value = rig::parse_number<double>(text)) return *value;
+  throw config::ConfigError("send: '" + text + "' is not a number; give a decimal number");
 }
 
 commands::Order order_of(const std::vector<std::string>& words) {
@@ -65,21 +61,13 @@ int send(const SendOptions& options) {
 
 Action add_send(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<SendOptions>();
-  parser.add({.names = "order",
-              .to = &o->order,
-              .help = "stop | start | continue | slip-ref X | gain NAME X",
-              .count = {1, 3},
-              .required = true});
-  parser.add(
-      {.names = "--config", .to = &o->sources.config_file, .help = "TOML file with commands.key_file", .type = "FILE"});
+  parser.add("order", &o->order, "stop | start | continue | slip-ref X | gain NAME X",
+             {.count = {1, 3}, .required = true});
+  parser.add("--config", &o->sources.config_file, "TOML file with commands.key_file", {.type = "FILE"});
   add_assignments(parser, o->sources);
-  parser.add({.names = "--lcm-url", .to = &o->lcm_url, .help = "LCM network"});
-  parser.add({.names = "--timeout",
-              .to = &o->timeout_s,
-              .help = "longest wait for the answer, s",
-              .type = "S",
-              .range = {0.1, 60.0},
-              .show_default = true});
+  parser.add("--lcm-url", &o->lcm_url, "LCM network");
+  parser.add("--timeout", &o->timeout_s, "longest wait for the answer, s",
+             {.type = "S", .range = {0.1, 60.0}, .show_default = true});
   return [o] { return send(*o); };
 }
 

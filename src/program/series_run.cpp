@@ -19,7 +19,6 @@
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
-#include "program/questions.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/clean_text.hpp"
@@ -215,11 +214,7 @@ class SeriesRun {
     const bool at_once = base_.virtual_time && base_.settings.backend == "sim";
     study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
-    if (interrupted_ == 0 && signalled() != rig::Reason::none) {
-      run::RunOutcome outcome;
-      outcome.reason = signalled();
-      interrupted_ = status_of(outcome);
-    }
+    if (interrupted_ == 0 && signalled() != rig::Reason::none) interrupted_ = status_of(signalled());
     fmt::print("{}\n", in_words());
     if (interrupted_ != 0) return interrupted_;
     return ended_early_ == 0 && !cut_short() ? exit_completed : exit_ended_early;

@@ -1,17 +1,19 @@
-// `abs_hil study` with merge, status and submit.
+// `abs_hil study` with merge, status and submit, and the progress of many runs.
 #include "program/study_command.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
-#include <charconv>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "config/config_error.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
 #include "study/runs.hpp"
@@ -22,53 +24,31 @@ namespace {
 
 void add_submit(cli::Parser& study, StudyCommand& command) {
   command.submit = study.add_subcommand("submit", "compute a study on a Slurm cluster: an array job, then a merge");
-  command.submit.add(
-      {.names = "file", .to = &command.submitted, .help = "the study", .type = "FILE", .required = true});
-  command.submit.add({.names = "--array",
-                      .to = &command.array,
-                      .help = "tasks of the array job",
-                      .type = "N",
-                      .range = {1, 1'000'000},
-                      .required = true});
-  command.submit.add({.names = "--out",
-                      .to = &command.submitted_folder,
-                      .help = "folder of the study, on a file system that all nodes share",
-                      .type = "DIR"});
-  command.submit.add(
-      {.names = "--write-only", .to = &command.write_only, .help = "write the scripts, and do not call sbatch"});
-  command.submit.add({.names = "options",
-                      .to = &command.sbatch,
-                      .help = "options of sbatch for both jobs, after --",
-                      .type = "OPTION"});
+  command.submit.add("file", &command.file, "the study", {.type = "FILE", .required = true});
+  command.submit.add("--array", &command.array, "tasks of the array job",
+                     {.type = "N", .range = {1, 1'000'000}, .required = true});
+  command.submit.add("--out", &command.folder, "folder of the study, on a file system that all nodes share",
+                     {.type = "DIR"});
+  command.submit.add("--write-only", &command.write_only, "write the scripts, and do not call sbatch");
+  command.submit.add("options", &command.sbatch, "options of sbatch for both jobs, after --", {.type = "OPTION"});
 }
 
 void add_options(StudyCommand& command) {
-  command.parser.add({.names = "file", .to = &command.file, .help = "the study (docs/studies.md)", .type = "FILE"});
-  command.parser.add({.names = "--out",
-                      .to = &command.folder,
-                      .help = "folder of the results (default: one of the study's name below runs/); with --run that "
-                              "of the run",
-                      .type = "DIR"});
+  command.parser.add("file", &command.file, "the study (docs/studies.md)", {.type = "FILE"});
+  command.parser.add("--out", &command.folder,
+                     "folder of the results (default: one of the study's name below runs/); with --run that "
+                     "of the run",
+                     {.type = "DIR"});
   add_threads(command.parser, command.threads);
-  command.parser.add({.names = "--shard",
-                      .to = &command.shard,
-                      .help = "compute the I-th of N parts only; `merge` puts the parts together",
-                      .type = "I/N"});
-  command.parser.add({.names = "--run",
-                      .to = &command.run,
-                      .help = "repeat one run with everything recorded in a run folder",
-                      .type = "K",
-                      .range = {0, 2'000'000'000},
-                      .excludes = {"--shard"}});
+  command.parser.add("--shard", &command.shard, "compute the I-th of N parts only; `merge` puts the parts together",
+                     {.type = "I/N"});
+  command.parser.add("--run", &command.run, "repeat one run with everything recorded in a run folder",
+                     {.type = "K", .range = {0, 2'000'000'000}, .excludes = {"--shard"}});
   command.merge = command.parser.add_subcommand("merge", "put the parts of a study together");
-  command.merge.add({.names = "folder",
-                     .to = &command.merged,
-                     .help = "folders with parts; the results go into the first",
-                     .type = "DIR",
-                     .required = true});
+  command.merge.add("folder", &command.merged, "folders with parts; the results go into the first",
+                    {.type = "DIR", .required = true});
   command.status = command.parser.add_subcommand("status", "how much of a study is done");
-  command.status.add(
-      {.names = "folder", .to = &command.looked_at, .help = "folder of a study", .type = "DIR", .required = true});
+  command.status.add("folder", &command.folder, "folder of a study", {.type = "DIR", .required = true});
   add_submit(command.parser, command);
 }
 
@@ -90,16 +70,22 @@ std::string study_folder(const std::string& file, const std::optional<std::strin
 
 namespace {
 
+/// "420 ms", "1.6 s", "12 s", "3 min", "5.2 h".
+std::string duration_text(double seconds) {
+  if (seconds < 1.0) return fmt::format("{:.0f} ms", 1e3 * seconds);
+  if (seconds < 90.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 1 : 0);
+  if (seconds < 5400.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
 std::string name_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
 
 study::Shard read_shard(const std::string& text) {
-  study::Shard shard;
-  const char* end = text.data() + text.size();
-  const auto [slash, problem] = std::from_chars(text.data(), end, shard.number);
-  if (problem == std::errc() && slash != end && *slash == '/') {
-    const auto [at, error] = std::from_chars(slash + 1, end, shard.of);
-    if (error == std::errc() && at == end && shard.number >= 1 && shard.number <= shard.of) return shard;
-  }
+  const std::string_view words = text;
+  const std::size_t slash = std::min(words.find('/'), words.size());
+  const auto number = rig::parse_number<std::uint64_t>(words.substr(0, slash));
+  const auto of = rig::parse_number<std::uint64_t>(words.substr(std::min(slash + 1, words.size())));
+  if (number && of && *number >= 1 && *number <= *of) return {*number, *of};
   throw config::ConfigError(
       fmt::format("--shard {}: give I/N with 1 <= I <= N, as in --shard 3/8 for the third of eight parts", text));
 }
@@ -203,7 +189,7 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
                                           command.parser.given().front()));
   }
   if (command.merge.parsed()) return merge_study(command.merged);
-  if (command.status.parsed()) return show_status(command.looked_at);
+  if (command.status.parsed()) return show_status(*command.folder);
   if (command.submit.parsed()) return submit_study(command);
   if (command.file.empty()) {
     throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
@@ -211,6 +197,39 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
   if (!command.run) return run_study(command);
   return record_run(study::make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
                     command.folder, command_line);
+}
+
+namespace {
+
+constexpr auto least_pause = std::chrono::milliseconds(100);
+constexpr double believable_after_s = 2.0;
+
+}  // namespace
+
+RunProgress::RunProgress(std::uint64_t runs) : runs_(runs), terminal_(isatty(STDERR_FILENO) == 1) {
+  note_signals(true);
+}
+
+RunProgress::~RunProgress() {
+  if (terminal_) std::fputs("\r\033[K", stderr);
+}
+
+void RunProgress::show(std::uint64_t done) {
+  if (signalled() != rig::Reason::none) throw Interrupted{done};
+  if (!terminal_) return;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  const auto now = Clock::now();
+  if (!lock || now - shown_ < least_pause) return;
+  shown_ = now;
+  const double spent_s = std::chrono::duration<double>(now - start_).count();
+  const double rate_Hz = static_cast<double>(done) / spent_s;
+  // Threads begin with many runs at once, which end together: the first seconds tell no rate.
+  const std::string left = spent_s < believable_after_s
+                               ? ""
+                               : fmt::format(", {:.0f} runs/s, {} left", rate_Hz,
+                                             duration_text(static_cast<double>(runs_ - done) / rate_Hz));
+  fmt::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
+  std::fflush(stderr);
 }
 
 }  // namespace abs_hil::program

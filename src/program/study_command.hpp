@@ -16,8 +16,8 @@ namespace abs_hil::program {
 
 /// `abs_hil study` and its subcommands as typed.
 struct StudyCommand {
-  std::string file{};
-  std::optional<std::string> folder{};  ///< --out
+  std::string file{};                   ///< also that of `submit`
+  std::optional<std::string> folder{};  ///< --out, also of `submit`; the folder of `status`
   std::optional<std::string> shard{};   ///< "I/N"
   std::size_t threads{0};               ///< 0: one for each processor
   std::optional<int> run{};             ///< --run
@@ -26,11 +26,8 @@ struct StudyCommand {
   std::vector<std::string> merged{};  ///< folders of `merge`; the results go into the first
   cli::Parser merge{};
 
-  std::string looked_at{};  ///< folder of `status`
   cli::Parser status{};
 
-  std::string submitted{};  ///< file of `submit`
-  std::optional<std::string> submitted_folder{};
   int array{0};
   bool write_only{false};
   std::vector<std::string> sbatch{};
@@ -84,8 +81,5 @@ class RunProgress {
   Clock::time_point shown_{};
   std::mutex mutex_{};
 };
-
-/// "420 ms", "1.6 s", "12 s", "3 min", "5.2 h".
-[[nodiscard]] std::string duration_text(double seconds);
 
 }  // namespace abs_hil::program

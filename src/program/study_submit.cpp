@@ -15,6 +15,7 @@
 #include "files/result_file.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "study/compute.hpp"
 
 namespace abs_hil::program {
@@ -91,19 +92,12 @@ std::string submitted(const std::string& options, const fs::path& file) {
   return id;
 }
 
-/// A name that Slurm and a shell take as it is.
-std::string plain(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_'; }, '_');
-  return name;
-}
-
 }  // namespace
 
 int submit_study(const StudyCommand& command) {
   check_options(command.sbatch);
-  const fs::path file = fs::absolute(command.submitted);
-  const fs::path path = fs::absolute(study_folder(command.submitted, command.submitted_folder));
+  const fs::path file = fs::absolute(command.file);
+  const fs::path path = fs::absolute(study_folder(command.file, command.folder));
   if (path.string().find_first_of("\r\n%\\\"") != std::string::npos) {
     throw config::ConfigError(
         fmt::format("--out {}: Slurm takes %, \\, quotes and line ends in paths for something "
@@ -111,7 +105,7 @@ int submit_study(const StudyCommand& command) {
                     path.string()));
   }
   // Everything that is wrong with the study shows here, not in a log on a node.
-  const study::Study study = study::make_study(study::load_study(command.submitted));
+  const study::Study study = study::make_study(study::load_study(command.file));
   const study::StudyFolder folder(path, study::facts_of(study, file.stem().string()));
   const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
   if (missing.empty()) {
@@ -125,7 +119,7 @@ int submit_study(const StudyCommand& command) {
   const std::string program = quoted(fs::read_symlink("/proc/self/exe").string());
   const fs::path slurm = path / "slurm";
   fs::create_directories(slurm);
-  const std::string name = plain(file.stem().string());
+  const std::string name = rig::plain_name(file.stem().string(), "-_");  // Slurm and a shell take it as it is
   const fs::path array = slurm / "array.sh";
   const fs::path merge = slurm / "merge.sh";
   files::write_result(array, "script",

@@ -1,17 +1,20 @@
-// `abs_hil validate`: an experiment in words, checked against the limits of its backend.
+// Files that people write: `abs_hil validate`, an experiment in words, checked against the limits of its backend, and
+// `abs_hil init-rig`, a plant's file to fill in for a rig of one's own.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "abs_hil/plant_sim/plant.hpp"
-#include "config/explain.hpp"
-#include "config/library.hpp"
+#include "config/config_error.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
+#include "files/result_file.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
@@ -51,14 +54,35 @@ int validate(const config::Sources& sources) {
   return exit_completed;
 }
 
+int init_rig(const config::Settings& settings, const std::string& name) {
+  if (name.empty() || rig::plain_name(name, "-_") != name) {
+    throw config::ConfigError(fmt::format("init-rig: \"{}\": give a name of letters, digits, - and _", name));
+  }
+  const std::filesystem::path file = name + ".toml";
+  std::error_code ignored;
+  if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored))) {
+    throw config::ConfigError(
+        fmt::format("init-rig: {} exists already; give another name or move it away", file.string()));
+  }
+  try {
+    files::write_result(file, "model file", config::rig_file(settings, name));
+  } catch (const files::FileError& error) {
+    throw config::ConfigError(std::string("init-rig: ") + error.what());
+  }
+  fmt::print(
+      "{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil commission --set rig.identity={0}, "
+      "abs_hil --backend rig --set rig.identity={0} --model {0}\n",
+      file.string());
+  return exit_completed;
+}
+
 }  // namespace
 
 Action add_validate(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<config::Sources>();
   const auto schema = std::make_shared<bool>(false);
-  parser.add(
-      {.names = "EXPERIMENT", .to = &o->experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});
-  parser.add({.names = "--schema", .to = schema.get(), .help = "print the JSON Schema of experiment files instead"});
+  parser.add("EXPERIMENT", &o->experiment, "experiment by name or TOML file", {.type = "NAME|FILE"});
+  parser.add("--schema", schema.get(), "print the JSON Schema of experiment files instead");
   add_backend_option(parser, *o);
   add_configuration_options(parser, *o);
   return [o, schema] {
@@ -66,6 +90,14 @@ Action add_validate(cli::Parser& parser, const Words&) {
     fmt::print("{}\n", config::schema().dump(2));
     return int{exit_completed};
   };
+}
+
+Action add_init_rig(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<config::Sources>();
+  const auto name = std::make_shared<std::string>();
+  parser.add("name", name.get(), "name of the rig", {.type = "NAME", .required = true});
+  parser.add("--plant", &o->plant, "plant whose values it begins with, by name or TOML file", {.type = "NAME|FILE"});
+  return [o, name] { return init_rig(config::merged_settings(*o), *name); };
 }
 
 }  // namespace abs_hil::program

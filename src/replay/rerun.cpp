@@ -39,7 +39,7 @@ bool same_duties(const rig::Command& a, const rig::Command& b) noexcept {
 class RecordedRig final : public driver::RigDriver {
  public:
   RecordedRig(const RecordedRun& run, const config::Settings& s)
-      : run_(run), settings_(s), grid_(config::output_grid(s)) {}
+      : run_(run), settings_(s), grid_(config::output_grid(s, s.plant)) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }

@@ -1,10 +1,15 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <concepts>
 #include <cstddef>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace abs_hil::rig {
@@ -30,6 +35,23 @@ template <typename... Values>
   std::string text;
   for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
   return text;
+}
+
+/// The text as a plain name: whatever is neither a letter or a digit of ASCII nor one of `also` becomes '_'.
+[[nodiscard]] inline std::string plain_name(std::string text, std::string_view also) {
+  const auto is_odd = [also](unsigned char c) {
+    return std::isalnum(c) == 0 && also.find(static_cast<char>(c)) == also.npos;
+  };
+  std::ranges::replace_if(text, is_odd, '_');
+  return text;
+}
+
+/// The whole text as a number, an integer in the base if one is given; nothing for any other text.
+template <typename Number>
+[[nodiscard]] std::optional<Number> parse_number(std::string_view text, std::same_as<int> auto... base) noexcept {
+  Number value{};
+  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value, base...);
+  return error == std::errc() && at == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace abs_hil::rig

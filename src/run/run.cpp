@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "driver/factory.hpp"
 #include "driver/injection/injecting_driver.hpp"
 #include "driver/injection/injection.hpp"
@@ -102,17 +102,12 @@ Prepared::Prepared(const config::Settings& s, config::Plan its_plan)
       period_ns(std::llround(1e9 / s.control.rate_Hz)),
       to_stop(config::means_to_stop(plan, s.experiment.end_speed_m_s)) {}
 
-driver::OutputGrid Prepared::grid(const plant_sim::PlantOptions& plant) const {
-  return settings.on_rig() ? driver::output_grid(settings.driver)
-                           : driver::simulated_output_grid(settings.driver, plant.ideal_actuator);
-}
-
 experiment::RunLogicParts Prepared::logic_parts(const plant_sim::PlantOptions& plant) const {
   const config::Settings& s = settings;
   experiment::RunLogicParts parts =
       experiment::make_logic_parts(s.control, s.model, s.on_rig() ? s.rig.parameters : plant_sim::identity_of(plant),
                                    s.plant.ideal_actuator, s.gate, s.experiment, plan.phases, plan.limits);
-  parts.duty_steps = grid(plant).duty_steps;
+  parts.duty_steps = config::output_grid(s, plant).duty_steps;
   return parts;
 }
 
@@ -128,7 +123,7 @@ Run::Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts
       driver_(own_driver_ ? *own_driver_ : *given.driver),
       logic_(std::move(parts)),
       outer_logic_(given.logic ? given.logic(logic_) : nullptr),
-      gate_(given.checks_wheels ? logic_.make_gate(settings().gate) : logic_.make_gate_without_wheels(settings().gate)),
+      gate_(logic_.make_gate(settings().gate, given.checks_wheels)),
       ring_(given.stepped ? stepped_ring_capacity : ring_capacity),
       executive_(clock_, driver_, outer_logic_ ? *outer_logic_ : logic_, gate_, ring_, prepared.period_ns,
                  given.overruns.value_or(settings().realtime.overruns), !given.stepped),

@@ -35,10 +35,8 @@ struct Prepared {
   Prepared(const config::Settings& settings, const config::Script& script);
   Prepared(const config::Settings& settings, config::Plan plan);
 
-  /// What the outputs make of a command.
-  /// @param plant  the simulated rig; not used on a board
-  [[nodiscard]] driver::OutputGrid grid(const plant_sim::PlantOptions& plant) const;
   /// Throws std::invalid_argument for options that cannot be used.
+  /// @param plant  the simulated rig; not used on a board
   [[nodiscard]] experiment::RunLogicParts logic_parts(const plant_sim::PlantOptions& plant) const;
 
   const config::Settings& settings;

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "run/run_summary.hpp"
 #include "study/parallel.hpp"
 #include "study/runs.hpp"

@@ -42,10 +42,17 @@ Answer answer_of(cli::Parser& parser, const std::vector<const char*>& arguments)
   return {status, out.text(), err.text()};
 }
 
+struct Row {
+  std::string names;
+  cli::Target to;
+  std::string help;
+  cli::Option more{};
+};
+
 /// The answer of a parser `rig` with this one option.
-Answer answer_of(const cli::Option& row, const std::vector<const char*>& arguments) {
+Answer answer_of(const Row& row, const std::vector<const char*>& arguments) {
   cli::Parser parser("rig", "");
-  parser.add(row);
+  parser.add(row.names, row.to, row.help, row.more);
   return answer_of(parser, arguments);
 }
 
@@ -77,18 +84,18 @@ TEST_CASE("a row puts its value into a target of its own type") {
   std::optional<std::string> untouched;
   std::string place;
   cli::Parser parser("rig", "");
-  parser.add({.names = "--flag", .to = &flag, .help = ""});
-  parser.add({.names = "--off", .to = &off, .help = "", .sets = false});
-  parser.add({.names = "--number", .to = &number, .help = ""});
-  parser.add({.names = "--small", .to = &small, .help = ""});
-  parser.add({.names = "--medium", .to = &medium, .help = ""});
-  parser.add({.names = "--large", .to = &large, .help = ""});
-  parser.add({.names = "--real", .to = &real, .help = ""});
-  parser.add({.names = "-t,--text", .to = &text, .help = ""});
-  parser.add({.names = "--maybe-number", .to = &maybe_number, .help = ""});
-  parser.add({.names = "--maybe-text", .to = &maybe_text, .help = ""});
-  parser.add({.names = "--untouched", .to = &untouched, .help = ""});
-  parser.add({.names = "place", .to = &place, .help = ""});
+  parser.add("--flag", &flag, "");
+  parser.add("--off", &off, "", {.sets = false});
+  parser.add("--number", &number, "");
+  parser.add("--small", &small, "");
+  parser.add("--medium", &medium, "");
+  parser.add("--large", &large, "");
+  parser.add("--real", &real, "");
+  parser.add("-t,--text", &text, "");
+  parser.add("--maybe-number", &maybe_number, "");
+  parser.add("--maybe-text", &maybe_text, "");
+  parser.add("--untouched", &untouched, "");
+  parser.add("place", &place, "");
   const Answer answer = answer_of(parser, {"--flag", "--off", "--number=-3", "--small", "65535", "--medium",
                                            "4294967295", "--large", "18446744073709551615", "--real", "2.5", "-t",
                                            "a b", "--maybe-number", "7", "--maybe-text", "c", "here"});
@@ -116,18 +123,16 @@ TEST_CASE("a value of another type is refused") {
   std::uint16_t small = 1;
   double real = 1.0;
   bool flag = false;
-  CHECK(error_of(answer_of({.names = "--n", .to = &number, .help = ""}, {"--n", "x"})) == "Could not convert: --n = x");
-  CHECK(error_of(answer_of({.names = "--n", .to = &small, .help = ""}, {"--n", "65536"})) ==
-        "Could not convert: --n = 65536");
-  CHECK(error_of(answer_of({.names = "--n", .to = &real, .help = ""}, {"--n", "1.5V"})) ==
-        "Could not convert: --n = 1.5V");
-  CHECK(error_of(answer_of({.names = "--n", .to = &flag, .help = ""}, {"--n=x"})) == "Could not convert: --n = x");
-  CHECK(error_of(answer_of({.names = "--n", .to = &number, .help = ""}, {"--n"})) == "--n: 1 required INT missing");
+  CHECK(error_of(answer_of({"--n", &number, ""}, {"--n", "x"})) == "Could not convert: --n = x");
+  CHECK(error_of(answer_of({"--n", &small, ""}, {"--n", "65536"})) == "Could not convert: --n = 65536");
+  CHECK(error_of(answer_of({"--n", &real, ""}, {"--n", "1.5V"})) == "Could not convert: --n = 1.5V");
+  CHECK(error_of(answer_of({"--n", &flag, ""}, {"--n=x"})) == "Could not convert: --n = x");
+  CHECK(error_of(answer_of({"--n", &number, ""}, {"--n"})) == "--n: 1 required INT missing");
 }
 
 TEST_CASE("a range includes both ends and no more") {
   std::uint64_t cases = 5;
-  const cli::Option integer{.names = "--cases", .to = &cases, .help = "", .range = {1, 1'000}};
+  const Row integer{"--cases", &cases, "", {.range = {1, 1'000}}};
   CHECK(error_of(answer_of(integer, {"--cases", "1"})) == "none");
   CHECK(cases == 1);
   CHECK(error_of(answer_of(integer, {"--cases", "1000"})) == "none");
@@ -135,15 +140,15 @@ TEST_CASE("a range includes both ends and no more") {
   CHECK(error_of(answer_of(integer, {"--cases", "1001"})) == "--cases: Value 1001 not in range 1 to 1000");
   CHECK(error_of(answer_of(integer, {"--cases", "1.5"})) == "--cases: Value 1.5 not in range 1 to 1000");
   double wait = 5.0;
-  const cli::Option real{.names = "--wait", .to = &wait, .help = "", .range = {0.1, 60.0}};
+  const Row real{"--wait", &wait, "", {.range = {0.1, 60.0}}};
   CHECK(error_of(answer_of(real, {"--wait", "0.1"})) == "none");
   CHECK(error_of(answer_of(real, {"--wait", "60"})) == "none");
   CHECK(error_of(answer_of(real, {"--wait", "0.09"})) == "--wait: Value 0.09 not in range 0.100000 to 60.000000");
   CHECK(error_of(answer_of(real, {"--wait", "60.1"})) == "--wait: Value 60.1 not in range 0.100000 to 60.000000");
   for (const char* text : {"nan", "NAN", "inf", "1e999"}) {
-    for (const cli::Range range : {cli::Range{}, real.range}) {
+    for (const cli::Range range : {cli::Range{}, real.more.range}) {
       CAPTURE(text, range.most);
-      const cli::Option option{.names = "--wait", .to = &wait, .help = "", .range = range};
+      const Row option{"--wait", &wait, "", {.range = range}};
       CHECK(error_of(answer_of(option, {"--wait", text})) != "none");
     }
   }
@@ -152,12 +157,12 @@ TEST_CASE("a range includes both ends and no more") {
 
 TEST_CASE("a row may list its values") {
   std::string backend = "sim";
-  const cli::Option text{.names = "--backend", .to = &backend, .help = "", .one_of = {"sim", "rig"}};
+  const Row text{"--backend", &backend, "", {.one_of = {"sim", "rig"}}};
   CHECK(error_of(answer_of(text, {"--backend", "rig"})) == "none");
   CHECK(backend == "rig");
   CHECK(error_of(answer_of(text, {"--backend", "other"})) == "--backend: other not in {sim,rig}");
   std::uint32_t bit = 0;
-  const cli::Option number{.names = "--bit", .to = &bit, .help = "", .one_of = {"0", "2"}};
+  const Row number{"--bit", &bit, "", {.one_of = {"0", "2"}}};
   CHECK(error_of(answer_of(number, {"--bit", "02"})) == "none");  // the number 2, not the text
   CHECK(bit == 2);
   CHECK(error_of(answer_of(number, {"--bit", "1"})) == "--bit: 1 not in {0,2}");
@@ -165,21 +170,21 @@ TEST_CASE("a row may list its values") {
 
 TEST_CASE("a list takes all values that follow, or one each time") {
   Texts all;
-  CHECK(error_of(answer_of({.names = "--bdf", .to = &all, .help = ""}, {"--bdf", "a", "b"})) == "none");
+  CHECK(error_of(answer_of({"--bdf", &all, ""}, {"--bdf", "a", "b"})) == "none");
   CHECK(all == Texts{"a", "b"});
   Texts each;
-  const cli::Option repeated{.names = "--set", .to = &each, .help = "", .repeated = true};
+  const Row repeated{"--set", &each, "", {.repeated = true}};
   CHECK(error_of(answer_of(repeated, {"--set", "a=1", "--set", "b=2"})) == "none");
   CHECK(each == Texts{"a=1", "b=2"});
   CHECK(error_of(answer_of(repeated, {"--set", "a=1", "b=2"})) == "unexpected argument b=2");
   std::string once;
-  CHECK(error_of(answer_of({.names = "--out", .to = &once, .help = ""}, {"--out", "a", "--out", "b"})) ==
+  CHECK(error_of(answer_of({"--out", &once, ""}, {"--out", "a", "--out", "b"})) ==
         "--out: At Most 1 required but received 2");
 }
 
 TEST_CASE("a row may require values") {
   Texts order;
-  const cli::Option row{.names = "order", .to = &order, .help = "", .count = {.least = 2, .most = 3}, .required = true};
+  const Row row{"order", &order, "", {.count = {.least = 2, .most = 3}, .required = true}};
   CHECK(error_of(answer_of(row, {"a", "b", "c"})) == "none");
   CHECK(order == Texts{"a", "b", "c"});
   CHECK(error_of(answer_of(row, {})) == "order is required");
@@ -194,10 +199,10 @@ TEST_CASE("a row may need or exclude another, in a group too") {
     double wait = 0.0;
     cli::Parser parser("rig", "");
     cli::Parser board = parser.add_group("board", "", {});
-    board.add({.names = "--can", .to = &can, .help = ""});
-    parser.add({.names = "--truth", .to = &truth, .help = "", .excludes = {"--can"}});
-    parser.add({.names = "--once", .to = &once, .help = ""});
-    parser.add({.names = "--wait", .to = &wait, .help = "", .needs = {"--once"}, .excludes = {"--can", "--truth"}});
+    board.add("--can", &can, "");
+    parser.add("--truth", &truth, "", {.excludes = {"--can"}});
+    parser.add("--once", &once, "");
+    parser.add("--wait", &wait, "", {.needs = {"--once"}, .excludes = {"--can", "--truth"}});
     return error_of(answer_of(parser, arguments));
   };
   CHECK(error({"--truth", "t", "--once"}) == "none");
@@ -207,8 +212,8 @@ TEST_CASE("a row may need or exclude another, in a group too") {
   CHECK(error({"--wait", "1"}) == "--wait requires --once");
   CHECK(error({"--wait", "1", "--once"}) == "none");
   bool flag = false;
-  CHECK_THROWS(answer_of({.names = "--flag", .to = &flag, .help = "", .needs = {"--nothing"}}, {}));
-  CHECK_THROWS(answer_of({.names = "--flag", .to = &flag, .help = "", .excludes = {"--nothing"}}, {}));
+  CHECK_THROWS(answer_of({"--flag", &flag, "", {.needs = {"--nothing"}}}, {}));
+  CHECK_THROWS(answer_of({"--flag", &flag, "", {.excludes = {"--nothing"}}}, {}));
 }
 
 TEST_CASE("a group counts its options") {
@@ -216,8 +221,8 @@ TEST_CASE("a group counts its options") {
     bool a = false, b = false;
     cli::Parser parser("rig", "");
     cli::Parser group = parser.add_group("board", "", count);
-    group.add({.names = "--a", .to = &a, .help = ""});
-    group.add({.names = "--b", .to = &b, .help = ""});
+    group.add("--a", &a, "");
+    group.add("--b", &b, "");
     return error_of(answer_of(parser, arguments));
   };
   CHECK(error({.least = 1, .most = 1}, {"--b"}) == "none");
@@ -231,9 +236,9 @@ TEST_CASE("a group counts its options") {
 TEST_CASE("a command line has one subcommand at most, and errors name it") {
   bool fast = false, json = false;
   cli::Parser parser("rig", "");
-  parser.add({.names = "--fast", .to = &fast, .help = ""});
+  parser.add("--fast", &fast, "");
   cli::Parser list = parser.add_subcommand("list", "");
-  list.add({.names = "--json", .to = &json, .help = ""});
+  list.add("--json", &json, "");
   const cli::Parser watch = parser.add_subcommand("watch", "");
   CHECK(!answer_of(parser, {"--fast", "list", "--json"}).status);
   CHECK(fast);
@@ -259,9 +264,9 @@ TEST_CASE("a misspelt word names the nearest valid one") {
   bool fast = false;
   bool json = false;
   cli::Parser parser("rig", "");
-  parser.add({.names = "--fast", .to = &fast, .help = ""});
+  parser.add("--fast", &fast, "");
   cli::Parser list = parser.add_subcommand("list", "");
-  list.add({.names = "--json", .to = &json, .help = ""});
+  list.add("--json", &json, "");
   static_cast<void>(parser.add_subcommand("watch", ""));
   const auto refusal = [&parser](const std::vector<const char*>& words) { return answer_of(parser, words).err; };
   CHECK(refusal({"wach", "--fast"}) ==
@@ -283,9 +288,9 @@ TEST_CASE("help and version go to the standard output and end the program well")
   cli::Parser parser("rig", "Drives the rig");
   parser.set_version("1.2.3");
   parser.set_footer("See also the manual.");
-  parser.add({.names = "--backend", .to = &backend, .help = "where", .one_of = {"sim", "rig"}, .show_default = true});
-  parser.add({.names = "--repeat", .to = &repeat, .help = "runs", .type = "N", .show_default = true});
-  parser.add({.names = "--vary", .to = &vary, .help = "what varies", .default_text = "phase"});
+  parser.add("--backend", &backend, "where", {.one_of = {"sim", "rig"}, .show_default = true});
+  parser.add("--repeat", &repeat, "runs", {.type = "N", .show_default = true});
+  parser.add("--vary", &vary, "what varies", {.default_text = "phase"});
   const Answer help = answer_of(parser, {"--help"});
   CHECK(help.status == 0);
   CHECK(help.err.empty());

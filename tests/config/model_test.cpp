@@ -10,7 +10,6 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
 #include "config/plan.hpp"
 #include "temporary_folder.hpp"
 

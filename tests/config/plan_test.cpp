@@ -2,7 +2,6 @@
 #include "config/plan.hpp"
 
 #include "catch.hpp"
-#include "config/library.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::config;

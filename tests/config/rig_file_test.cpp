@@ -3,7 +3,6 @@
 
 #include "catch.hpp"
 #include "config/config_file.hpp"
-#include "config/explain.hpp"
 #include "config/key_table.hpp"
 #include "temporary_folder.hpp"
 

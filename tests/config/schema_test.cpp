@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "catch.hpp"
-#include "config/explain.hpp"
+#include "config/script.hpp"
 
 using namespace abs_hil;
 

@@ -5,8 +5,7 @@
 #include <numbers>
 
 #include "catch.hpp"
-#include "config/explain.hpp"
-#include "config/library.hpp"
+#include "config/plan.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::config;

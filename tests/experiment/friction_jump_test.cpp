@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "catch.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;

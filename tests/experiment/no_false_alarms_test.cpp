@@ -10,7 +10,6 @@
 #include "catch.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
 #include "config/plan.hpp"
 #include "injected_run.hpp"
 #include "simulated_run.hpp"

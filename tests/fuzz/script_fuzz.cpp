@@ -6,7 +6,6 @@
 #include <string>
 
 #include "config/config_error.hpp"
-#include "config/explain.hpp"
 #include "config/plan.hpp"
 #include "experiment/sequence.hpp"
 #include "fuzz_input.hpp"

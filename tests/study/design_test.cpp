@@ -7,7 +7,7 @@
 #include <set>
 
 #include "catch.hpp"
-#include "config/factors.hpp"
+#include "config/script.hpp"
 
 using namespace abs_hil::study;
 using abs_hil::config::Factor;

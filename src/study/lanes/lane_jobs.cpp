@@ -280,7 +280,7 @@ LaneSettings::LaneSettings(const config::Settings& settings) {
     parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
     if (!plan_sequence(prepared.plan, settings, parts->sequence)) return;
     parts->period_ns = prepared.period_ns;
-    parts->duty_steps = prepared.grid(settings.plant).duty_steps;
+    parts->duty_steps = config::output_grid(prepared.settings, settings.plant).duty_steps;
   } catch (const std::exception&) {
     return;  // `simulate` says what is wrong
   }

@@ -10,7 +10,7 @@
 #include "catch.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "config/library.hpp"
+#include "config/script.hpp"
 #include "study/batch.hpp"
 #include "study/lanes/lane_jobs.hpp"
 #include "study/variation.hpp"
