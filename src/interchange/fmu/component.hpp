@@ -14,9 +14,7 @@ using Logger = std::function<void(bool error, const std::string& text)>;
 
 /// The state of an instance at one time, as bytes of this build: parameters, inputs, outputs and what the model is made
 /// of.
-struct State {
-  std::string content{};
-};
+using State = std::string;
 
 [[nodiscard]] std::string to_bytes(const State& state);
 /// Throws std::invalid_argument for bytes that `to_bytes` did not make.
