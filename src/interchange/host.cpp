@@ -8,7 +8,6 @@
 #include <cmath>
 #include <csignal>
 #include <exception>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "interchange/confinement.hpp"
@@ -46,14 +45,6 @@ Offences probe(ForeignCode& code, const HostRequest& request, const std::functio
   return found;
 }
 
-ForeignSetup setup_of(const nlohmann::json& json) {
-  return {.file = json.at("file").get<std::string>(),
-          .folder = json.at("folder").get<std::string>(),
-          .mapping = json.at("mapping").get<std::string>(),
-          .period_s = json.at("period_s").get<double>(),
-          .parameters = json.at("parameters").get<std::vector<std::pair<std::string, double>>>()};
-}
-
 }  // namespace
 
 int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup&)>& make,
@@ -69,7 +60,7 @@ int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup
     if (const std::string why = confine(host_socket); !why.empty()) {
       throw std::runtime_error("this kernel cannot confine a controller from a file (" + why + ")");
     }
-    code = make(setup_of(nlohmann::json::parse(packet)));
+    code = make(nlohmann::json::parse(packet).get<ForeignSetup>());
   } catch (const std::exception& error) {
     static_cast<void>(send_json({{"error", error.what()}}));
     return 2;

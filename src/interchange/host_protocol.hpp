@@ -2,17 +2,19 @@
 
 #include <array>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 
 #include "interchange/foreign_code.hpp"
 
 namespace abs_hil::interchange {
 
 /// File descriptor of the host's socket (SOCK_SEQPACKET). The first packet is the setup as JSON, and its answer is
-/// JSON:
-/// {"signals": [...], "source": "..."} or {"error": "..."}. Then each packet is a HostRequest, and its answer a
+/// JSON: {"signals": [...], "source": "..."} or {"error": "..."}. Then each packet is a HostRequest, and its answer a
 /// HostAnswer.
 inline constexpr int host_socket = 3;
 inline constexpr std::size_t host_packet_max = 65'536;
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ForeignSetup, file, folder, mapping, period_s, parameters)
 
 enum class HostAction : std::uint32_t {
   reset,
@@ -26,13 +28,6 @@ struct HostRequest {
   std::uint32_t count{0};
   double period_s{0.0};
   abs_hil_input input{};
-};
-
-/// What real-time code must not do, found in trial steps.
-struct Offences {
-  std::uint64_t allocations{0};
-  std::uint64_t system_calls{0};
-  std::int32_t first_system_call{-1};
 };
 
 struct HostAnswer {

@@ -22,7 +22,7 @@ class HostedCode final : public ForeignCode {
   HostedCode(const HostedCode&) = delete;
   HostedCode& operator=(const HostedCode&) = delete;
   /// Ends the process.
-  ~HostedCode() override;
+  ~HostedCode() override { end(); }
 
   void reset(const abs_hil_input& input) noexcept override;
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override;
@@ -35,6 +35,9 @@ class HostedCode final : public ForeignCode {
   [[nodiscard]] Offences probe(double period_s, std::uint32_t steps);
 
  private:
+  explicit HostedCode(double period_s) : period_s_(period_s) {}
+
+  void start(const std::string& program);
   /// Waits for a packet and passes on what the code prints. Bytes of the packet; 0: the other end is closed; < 0: none
   /// came in time.
   [[nodiscard]] ssize_t receive(void* data, std::size_t size, int limit_ms) noexcept;
