@@ -1,5 +1,4 @@
 // Unpacks an FMU with checks of every name and size.
-#include "interchange/extracted_fmu.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -19,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
 
 namespace abs_hil::interchange {

@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "interchange/agent_controller.hpp"
-#include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
 #include "runtime/clock.hpp"
 

@@ -8,7 +8,7 @@
 #include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
-#include "interchange/extracted_fmu.hpp"
+#include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
 #include "runtime/cycle_statistics.hpp"
 

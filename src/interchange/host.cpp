@@ -11,7 +11,6 @@
 #include <string>
 
 #include "interchange/confinement.hpp"
-#include "interchange/host_protocol.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "interchange/foreign_code.hpp"
-#include "interchange/host_protocol.hpp"
+#include "interchange/host.hpp"
 
 namespace abs_hil::interchange {
 
