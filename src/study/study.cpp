@@ -132,11 +132,6 @@ bool Study::can_share_settings() const {
          });
 }
 
-std::uint64_t Study::runs_in(std::uint64_t chunk) const noexcept {
-  const std::uint64_t first = chunk * script_.chunk;
-  return std::min(script_.chunk, runs_ - first);
-}
-
 RunIndex Study::index_of(std::uint64_t run) const noexcept {
   RunIndex index;
   const auto take = [&run](std::uint64_t count) { return std::exchange(run, run / count) % count; };
