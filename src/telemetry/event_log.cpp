@@ -2,6 +2,7 @@
 #include "telemetry/event_log.hpp"
 
 #include <array>
+#include <boost/endian/conversion.hpp>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -13,21 +14,6 @@ constexpr std::uint32_t sync_word = 0xEDA1DA01;
 constexpr std::size_t header_bytes = 28;  // sync, number, timestamp, length of channel, length of data
 constexpr std::uint32_t channel_max_bytes = 63;
 constexpr std::uint32_t data_max_bytes = 1U << 28U;  // LCM's own limit
-
-template <class Unsigned>
-Unsigned big_endian(const std::uint8_t* bytes) {
-  Unsigned value = 0;
-  for (std::size_t i = 0; i < sizeof value; ++i) value = static_cast<Unsigned>(value << 8U | bytes[i]);
-  return value;
-}
-
-template <class Unsigned>
-std::uint8_t* put_big_endian(std::uint8_t* to, Unsigned value) {
-  for (std::size_t i = 0; i < sizeof value; ++i) {
-    *to++ = static_cast<std::uint8_t>(value >> (8 * (sizeof value - 1 - i)));
-  }
-  return to;
-}
 
 }  // namespace
 
@@ -62,15 +48,15 @@ std::optional<LogEvent> EventLogReader::next() {
   std::array<std::uint8_t, header_bytes> header{};
   const std::size_t read = std::fread(header.data(), 1, header.size(), file_.get());
   if (read == 0 && std::feof(file_.get()) != 0) return std::nullopt;
-  if (read >= sizeof sync_word && big_endian<std::uint32_t>(header.data()) != sync_word) {
+  if (read >= sizeof sync_word && boost::endian::load_big_u32(header.data()) != sync_word) {
     fail(events_ == 0 ? "not an LCM event log" : "the file is damaged: no event begins here");
   }
   if (read != header.size()) return end_cut_off();
   LogEvent event;
-  event.number = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[4]));
-  event.timestamp_us = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[12]));
-  const auto channel_bytes = big_endian<std::uint32_t>(&header[20]);
-  const auto data_bytes = big_endian<std::uint32_t>(&header[24]);
+  event.number = boost::endian::load_big_s64(&header[4]);
+  event.timestamp_us = boost::endian::load_big_s64(&header[12]);
+  const std::uint32_t channel_bytes = boost::endian::load_big_u32(&header[20]);
+  const std::uint32_t data_bytes = boost::endian::load_big_u32(&header[24]);
   if (channel_bytes == 0 || channel_bytes > channel_max_bytes || data_bytes > data_max_bytes) {
     fail("the file is damaged: these lengths are not valid");
   }
@@ -97,11 +83,11 @@ std::string for_each_event(const std::filesystem::path& log, const std::function
 void EventLogWriter::write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
                            std::span<const std::uint8_t> data) {
   std::array<std::uint8_t, header_bytes> header{};
-  std::uint8_t* to = put_big_endian(header.data(), sync_word);
-  to = put_big_endian(to, static_cast<std::uint64_t>(number));
-  to = put_big_endian(to, static_cast<std::uint64_t>(timestamp_us));
-  to = put_big_endian(to, static_cast<std::uint32_t>(channel.size()));
-  put_big_endian(to, static_cast<std::uint32_t>(data.size()));
+  boost::endian::store_big_u32(header.data(), sync_word);
+  boost::endian::store_big_s64(&header[4], number);
+  boost::endian::store_big_s64(&header[12], timestamp_us);
+  boost::endian::store_big_u32(&header[20], static_cast<std::uint32_t>(channel.size()));
+  boost::endian::store_big_u32(&header[24], static_cast<std::uint32_t>(data.size()));
   file_.append({reinterpret_cast<const char*>(header.data()), header.size()});
   file_.append(channel);
   file_.append({reinterpret_cast<const char*>(data.data()), data.size()});
