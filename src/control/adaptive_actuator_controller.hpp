@@ -18,7 +18,7 @@ namespace abs_hil::control {
 /// eta ) give V' = -x'Qx - lag_weight lag_gain eta^2 - ka1 phi theta_err^2 for
 ///   V = ( x'Px + lag_weight eta^2 + theta_err^2 / gamma ) / 2.
 /// While the command is limited, the integral is held and only the innovation adapts theta_hat. With an ideal actuator
-/// (no limit, no lag) the output equals that of AdaptiveController with the same gains, bit for bit.
+/// (no limit, no lag) the output equals that of AdaptiveLaw with the same gains, bit for bit.
 template <class S>
 class AdaptiveActuatorLaw {
  public:
@@ -168,7 +168,5 @@ void AdaptiveActuatorLaw<S>::take_over(const AdaptiveActuatorLaw& before) noexce
   slip_ = before.slip_;
   tuning_ = before.tuning_;
 }
-
-using AdaptiveActuatorController = LawController<AdaptiveActuatorLaw>;
 
 }  // namespace abs_hil::control

@@ -1,6 +1,8 @@
 // The paper's adaptive law (17)-(18).
 #pragma once
 
+#include <array>
+
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/law_controller.hpp"
@@ -26,8 +28,16 @@ class AdaptiveLaw {
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
   void take_over(const AdaptiveLaw& before) noexcept;
-  /// The values of AdaptiveController::signals for the error of the last step.
-  [[nodiscard]] rig::SignalValues states(double error_m_s) const noexcept
+  /// The states of (17), and V and V' of Theorem 3.1. V needs the true theta: these take the model's, so V falls as the
+  /// theorem says only if the model's theta is right.
+  static constexpr std::array<rig::Signal, 5> signals{{
+      {"I_m", "integral of the slip velocity error, I of (17), in m"},
+      {"omega1_hat_rad_s", "upper wheel's speed in the estimator of (17), in rad/s"},
+      {"zeta_N", "zeta of (17), in N"},
+      {"V", "Lyapunov function of Theorem 3.1, with the model's theta"},
+      {"V_dot", "its derivative V' by the theorem, with the model's theta and phi of the past interval"},
+  }};
+  void show(SlipOutput& output) const noexcept
     requires std::is_same_v<S, double>;
 
  private:
@@ -87,15 +97,5 @@ void AdaptiveLaw<S>::take_over(const AdaptiveLaw& before) noexcept {
   omega1_rad_s_ = before.omega1_rad_s_;
   slip_ = before.slip_;
 }
-
-class AdaptiveController final : public LawController<AdaptiveLaw> {
- public:
-  using LawController::LawController;
-
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  /// The states of (17), and V and V' of Theorem 3.1. V needs the true theta: these take the model's, so V falls as the
-  /// theorem says only if the model's theta is right.
-  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
-};
 
 }  // namespace abs_hil::control

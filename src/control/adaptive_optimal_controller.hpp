@@ -1,6 +1,9 @@
 // Brakes at the unknown peak of friction with as little motion of the brake as possible.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
@@ -56,7 +59,19 @@ class AdaptiveOptimalLaw {
   void reset(const BasicSlipInput<S>& input) noexcept
     requires std::is_same_v<S, double>;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
-  [[nodiscard]] const BasicFrictionBank<S>& bank() const noexcept { return bank_; }
+  static constexpr std::array<rig::Signal, 3> signals{{
+      {"peak_slip", "estimated slip of the largest tyre force"},
+      {"slip_zero", "estimated error of the slip: the true one less the one that is read"},
+      {"friction_jumps", "jumps of friction seen since braking began"},
+  }};
+  void show(BasicSlipOutput<S>& output) const noexcept {
+    output.signals[0] = bank_.peak_slip();
+    output.signals[1] = bank_.slip_zero();
+    output.signals[2] = bank_.jumps();
+  }
+  [[nodiscard]] std::vector<Learnt> learnt() const {
+    return {{"control.adaptive_optimal.last_peak_slip", bank_.learnt_peak_slip()}};
+  }
   /// Lanes learn in every cycle.
   [[nodiscard]] bool has_lanes() const noexcept
     requires std::is_same_v<S, double>
@@ -118,15 +133,6 @@ class AdaptiveOptimalLaw {
   S search_rad_{0.0};  ///< angle of the search, in [-pi, pi]
   Speeds last_speeds_{};
   Unlearnt unlearnt_{};
-};
-
-class AdaptiveOptimalController final : public LawController<AdaptiveOptimalLaw> {
- public:
-  using LawController::LawController;
-
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
-  [[nodiscard]] std::vector<Learnt> learnt() const override;
 };
 
 }  // namespace abs_hil::control

@@ -135,6 +135,4 @@ S AdaptivePeakLaw<S>::command_Nm(const BasicSlipInput<S>& input, const S& slip, 
                      wanted_Nm);
 }
 
-using AdaptivePeakController = LawController<AdaptivePeakLaw>;
-
 }  // namespace abs_hil::control

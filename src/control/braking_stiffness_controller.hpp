@@ -1,6 +1,8 @@
 // Raises the slip while the measured tyre force still grows with it.
 #pragma once
 
+#include <array>
+
 #include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
@@ -71,7 +73,9 @@ class BrakingStiffnessLaw {
 
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
-  [[nodiscard]] S elasticity() const noexcept { return stiffness_.elasticity(); }
+  static constexpr std::array<rig::Signal, 1> signals{
+      {{"elasticity", "estimated relative growth of the tyre force per relative growth of the slip"}}};
+  void show(BasicSlipOutput<S>& output) const noexcept { output.signals[0] = stiffness_.elasticity(); }
 
  private:
   void move_reference(const S& dt_s, const S& slip) noexcept;
@@ -128,13 +132,5 @@ BasicSlipOutput<S> BrakingStiffnessLaw<S>::step(const BasicSlipInput<S>& input) 
           .theta_est_N = rig::unknown,
           .slip_ref = reference};
 }
-
-class BrakingStiffnessController final : public LawController<BrakingStiffnessLaw> {
- public:
-  using LawController::LawController;
-
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
-};
 
 }  // namespace abs_hil::control

@@ -46,8 +46,6 @@ class LockedLaw {
   rig::BasicBrake<S> brake_{};
 };
 
-using LockedController = LawController<LockedLaw>;
-
 /// Relay as in the rig maker's demonstration: no torque while the slip is above a threshold, otherwise full torque (as
 /// LockedLaw). It has no state and so no hysteresis. theta_est_N is NaN.
 template <class S>
@@ -78,8 +76,6 @@ class RelayLaw {
   rig::BasicBrake<S> brake_{};
   S threshold_{0.0};
 };
-
-using RelayController = LawController<RelayLaw>;
 
 /// Brake torque that keeps e_v constant by (14): (J1/r1)(k F + friction drift). The lower wheel's deceleration gives
 /// the tyre force F = -(J2 omega2' + d2 omega2 + M20)/r2, taken as >= 0. This needs no tyre model and no theta.
@@ -135,8 +131,6 @@ class PiLaw {
   BasicSlipErrorIntegral<S> integral_{};
 };
 
-using PiController = LawController<PiLaw>;
-
 /// Mixed slip-deceleration control (Savaresi, Tanelli and Cantoni, 2007): a PI controller holds
 ///   slip + weight * (deceleration of the upper wheel's circumference in g)
 /// at one value. With a constant wheel slip the wheel decelerates as the car does, so the held slip is smaller where
@@ -182,7 +176,5 @@ BasicSlipOutput<S> MixedSlipDecelerationLaw<S>::step(const BasicSlipInput<S>& in
           .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
           .theta_est_N = rig::unknown};
 }
-
-using MixedSlipDecelerationController = LawController<MixedSlipDecelerationLaw>;
 
 }  // namespace abs_hil::control

@@ -68,7 +68,11 @@ class FivePhaseLaw {
     torque_Nm_ = before.torque_Nm_;
   }
 
-  [[nodiscard]] S phase() const noexcept { return phase_; }
+  [[nodiscard]] BrakePhase phase() const noexcept
+    requires std::is_same_v<S, double>
+  {
+    return static_cast<BrakePhase>(phase_);
+  }
 
  private:
   static S number(BrakePhase phase) noexcept { return S(static_cast<double>(phase)); }
@@ -139,11 +143,5 @@ BasicSlipOutput<S> FivePhaseLaw<S>::step(const BasicSlipInput<S>& input) noexcep
           .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
           .theta_est_N = rig::unknown};
 }
-
-class FivePhaseController final : public LawController<FivePhaseLaw> {
- public:
-  using LawController::LawController;
-  [[nodiscard]] BrakePhase phase() const noexcept { return static_cast<BrakePhase>(law_.phase()); }
-};
 
 }  // namespace abs_hil::control

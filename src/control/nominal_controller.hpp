@@ -49,6 +49,4 @@ class NominalLaw {
   BasicSlipErrorIntegral<S> integral_{};
 };
 
-using NominalController = LawController<NominalLaw>;
-
 }  // namespace abs_hil::control

@@ -111,6 +111,4 @@ S SlidingModeActuatorLaw<S>::reference_rate_m_s3(const BasicSlipInput<S>& input,
          motion.drift_rate_m_s3;
 }
 
-using SlidingModeActuatorController = LawController<SlidingModeActuatorLaw>;
-
 }  // namespace abs_hil::control

@@ -45,8 +45,6 @@ class SlidingModeLaw {
   S reaching_per_s_{0.0};
 };
 
-using SlidingModeController = LawController<SlidingModeLaw>;
-
 /// Closed-form solution e_v of e_v' = -K sat(e_v/width) after `time_s`. |e_v| falls at the rate K outside the boundary
 /// layer of that width, and exponentially inside it. Real-time safe.
 template <class S>
@@ -102,8 +100,6 @@ class SmoothSlidingModeLaw {
   S gain_m_s2_{0.0};
   S width_m_s_{0.0};
 };
-
-using SmoothSlidingModeController = LawController<SmoothSlidingModeLaw>;
 
 /// One period of the super-twisting algorithm e' = -k1 sqrt|e| sign(e) + z, z' = -k2 sign(e).
 template <class S>
@@ -177,7 +173,5 @@ class SuperTwistingLaw {
   S k2_{0.0};
   S integral_m_s2_{0.0};
 };
-
-using SuperTwistingController = LawController<SuperTwistingLaw>;
 
 }  // namespace abs_hil::control

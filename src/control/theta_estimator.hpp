@@ -50,7 +50,7 @@ template <class S>
 class BasicThetaEstimator {
  public:
   BasicThetaEstimator() = default;
-  /// @param options  gamma, ka1, zeta0, theta_min_N <= theta_max_N; AdaptiveController checks them
+  /// @param options  gamma, ka1, zeta0, theta_min_N <= theta_max_N; AdaptiveLaw checks them
   BasicThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept
     requires std::is_same_v<S, double>
       : laws_{paper::laws(wheels)},
