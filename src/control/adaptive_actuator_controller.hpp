@@ -26,8 +26,7 @@ class AdaptiveActuatorLaw {
 
   AdaptiveActuatorLaw() = default;
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
-  explicit AdaptiveActuatorLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit AdaptiveActuatorLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept;

@@ -22,8 +22,7 @@ class AdaptiveLaw {
 
   AdaptiveLaw() = default;
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
-  explicit AdaptiveLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit AdaptiveLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
@@ -37,8 +36,7 @@ class AdaptiveLaw {
       {"V", "Lyapunov function of Theorem 3.1, with the model's theta"},
       {"V_dot", "its derivative V' by the theorem, with the model's theta and phi of the past interval"},
   }};
-  void show(SlipOutput& output) const noexcept
-    requires std::is_same_v<S, double>;
+  void show(SlipOutput& output) const noexcept;
 
  private:
   void adapt(const BasicSlipInput<S>& input) noexcept;

@@ -13,7 +13,6 @@ namespace abs_hil::control {
 
 template <class S>
 AdaptiveLaw<S>::AdaptiveLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       tyre_{context.rig.tyre},
       theta_model_N_{context.rig.tyre.theta_N},
@@ -23,9 +22,7 @@ AdaptiveLaw<S>::AdaptiveLaw(const ControllerContext& context)
       theta_{context.options.adaptive, context.rig.wheels} {}
 
 template <class S>
-void AdaptiveLaw<S>::show(SlipOutput& output) const noexcept
-  requires std::is_same_v<S, double>
-{
+void AdaptiveLaw<S>::show(SlipOutput& output) const noexcept {
   using Laws = paper::Laws<double>;
   const double I = integral_.value_m();
   const double error_m_s = output.slip_velocity_error_m_s;
@@ -53,7 +50,6 @@ ControlOptions with_own_gains(const ControlOptions& options) {
 
 template <class S>
 AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       tyre_{context.rig.tyre},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -71,7 +67,6 @@ template class AdaptiveActuatorLaw<double>;
 
 template <class S>
 AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
@@ -101,7 +96,6 @@ const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
 
 template <class S>
 BrakingStiffnessLaw<S>::BrakingStiffnessLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},

@@ -49,7 +49,6 @@ ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters
 
 template <class S>
 AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : options_{counted(with_sound_slips(context.options.adaptive_optimal, "control.adaptive_optimal."),
                        coarseness(context.rig))},
       laws_{paper::laws(context.rig.wheels)},
@@ -65,9 +64,7 @@ AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
       bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 template <class S>
-void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
-  requires std::is_same_v<S, double>
-{
+void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
   observer_.reset(input.speeds);
   force_.reset(input.speeds.omega2_rad_s);
   const double turning_Nm = laws_.J1 * input.alpha1_rad_s2 + laws_.d1 * input.speeds.omega1_rad_s + laws_.M10;

@@ -53,11 +53,9 @@ class AdaptiveOptimalLaw {
 
   AdaptiveOptimalLaw() = default;
   /// Throws std::invalid_argument for options out of range.
-  explicit AdaptiveOptimalLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit AdaptiveOptimalLaw(const ControllerContext& context);
 
-  void reset(const BasicSlipInput<S>& input) noexcept
-    requires std::is_same_v<S, double>;
+  void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
   static constexpr std::array<rig::Signal, 3> signals{{
       {"peak_slip", "estimated slip of the largest tyre force"},
@@ -73,11 +71,7 @@ class AdaptiveOptimalLaw {
     return {{"control.adaptive_optimal.last_peak_slip", bank_.learnt_peak_slip()}};
   }
   /// Lanes learn in every cycle.
-  [[nodiscard]] bool has_lanes() const noexcept
-    requires std::is_same_v<S, double>
-  {
-    return learns_every_ <= 1.0;
-  }
+  [[nodiscard]] bool has_lanes() const noexcept { return learns_every_ <= 1.0; }
 
  private:
   using Bank = BasicFrictionBank<S>;

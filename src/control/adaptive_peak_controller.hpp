@@ -23,8 +23,7 @@ class AdaptivePeakLaw {
 
   AdaptivePeakLaw() = default;
   /// Throws std::invalid_argument for options out of range.
-  explicit AdaptivePeakLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit AdaptivePeakLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;

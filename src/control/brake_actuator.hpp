@@ -21,7 +21,6 @@ class BasicBrakeActuator {
   /// @param duty_steps steps of the PWM from duty 0 to duty 1; 0: any duty can be sent
   BasicBrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty,
                      std::uint32_t duty_steps = 0) noexcept
-    requires std::is_same_v<S, double>
       : brake_{brake},
         ideal_{ideal ? 1.0 : 0.0},
         duties_{brake, max_duty, ideal ? 0 : duty_steps},

@@ -68,8 +68,7 @@ class BrakingStiffnessLaw {
 
   BrakingStiffnessLaw() = default;
   /// Throws std::invalid_argument for options out of range.
-  explicit BrakingStiffnessLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit BrakingStiffnessLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;

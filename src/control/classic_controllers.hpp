@@ -30,7 +30,6 @@ class LockedLaw {
 
   LockedLaw() = default;
   explicit LockedLaw(const ControllerContext& context) noexcept
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, brake_{context.rig.brake} {}
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept {}
@@ -56,7 +55,6 @@ class RelayLaw {
   RelayLaw() = default;
   /// Throws std::invalid_argument for a threshold outside [0, 1).
   explicit RelayLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, brake_{context.rig.brake}, threshold_{context.options.relay.threshold} {
     rig::require_valid(context.options.relay, "control.relay.");
   }
@@ -102,7 +100,6 @@ class PiLaw {
   PiLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit PiLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         kp_per_s_{-std::expm1(-context.options.pi.kp_per_s / context.options.rate_Hz) * context.options.rate_Hz},
         ki_per_s2_{context.options.pi.ki_per_s2},
@@ -144,7 +141,6 @@ class MixedSlipDecelerationLaw {
   MixedSlipDecelerationLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit MixedSlipDecelerationLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},
         options_{context.options.mixed_slip_deceleration} {

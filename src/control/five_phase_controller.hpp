@@ -37,7 +37,6 @@ class FivePhaseLaw {
   FivePhaseLaw() = default;
   /// Throws std::invalid_argument if thresholds are out of order or a ramp or limit is not > 0.
   explicit FivePhaseLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},
         options_{context.options.five_phase},
@@ -68,11 +67,7 @@ class FivePhaseLaw {
     torque_Nm_ = before.torque_Nm_;
   }
 
-  [[nodiscard]] BrakePhase phase() const noexcept
-    requires std::is_same_v<S, double>
-  {
-    return static_cast<BrakePhase>(phase_);
-  }
+  [[nodiscard]] BrakePhase phase() const noexcept { return static_cast<BrakePhase>(phase_); }
 
  private:
   static S number(BrakePhase phase) noexcept { return S(static_cast<double>(phase)); }

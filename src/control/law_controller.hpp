@@ -10,8 +10,9 @@ namespace abs_hil::control {
 
 /// The slip controller of a law that is written over its scalar: `Law<double>` runs in the cycle, a `Law` of packs in
 /// many simulated runs side by side. A law has `reset` and `step` as SlipController has them, `take_over` if it can,
-/// and nothing but scalars of type S as members. With signals of its own it has the table `signals`, and `show`, which
-/// writes their values into an output of `step`; `learnt` if a braking leaves something.
+/// and nothing but scalars of type S as members. Only a `Law<double>` is made from a context. With signals of its own
+/// it has the table `signals`, and `show`, which writes their values into an output of `step`; `learnt` if a braking
+/// leaves something.
 template <template <class> class Law>
 class LawController : public SlipController {
  public:

@@ -26,7 +26,6 @@ class SlidingModeActuatorLaw {
   SlidingModeActuatorLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeActuatorLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         tyre_{context.rig.tyre},
         lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},

@@ -21,7 +21,6 @@ class SlidingModeLaw {
   SlidingModeLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.sliding_mode.adaptation},
         gain_m_s2_{context.options.sliding_mode.gain_m_s2},
         reaching_per_s_{context.options.sliding_mode.reaching_per_s} {
@@ -79,7 +78,6 @@ class SmoothSlidingModeLaw {
   SmoothSlidingModeLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SmoothSlidingModeLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.sliding_mode_smooth.adaptation},
         gain_m_s2_{context.options.sliding_mode_smooth.gain_m_s2},
         width_m_s_{context.options.sliding_mode_smooth.boundary_m_s} {
@@ -139,7 +137,6 @@ class SuperTwistingLaw {
   SuperTwistingLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SuperTwistingLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.super_twisting.adaptation},
         k1_{context.options.super_twisting.k1},
         k2_{context.options.super_twisting.k2} {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <stdexcept>
-#include <type_traits>
 
 #include "abs_hil/control/equivalent_control.hpp"
 #include "abs_hil/control/options.hpp"
@@ -23,7 +22,6 @@ class BasicSwitchingThetaEstimator {
   BasicSwitchingThetaEstimator() = default;
   /// Throws std::invalid_argument for a gain or bounds out of range.
   explicit BasicSwitchingThetaEstimator(const SwitchingAdaptationOptions<>& options)
-    requires std::is_same_v<S, double>
       : options_{options}, theta_N_{options.theta0_N} {
     rig::require_valid(options, "");
     if (!(options.theta_min_N <= options.theta0_N && options.theta0_N <= options.theta_max_N)) {
@@ -65,7 +63,6 @@ class BasicSlidingSurface {
   BasicSlidingSurface() = default;
   /// Throws std::invalid_argument for options out of range.
   BasicSlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions<>& adaptation)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, tyre_{context.rig.tyre}, equivalent_{context}, theta_{adaptation} {}
 
   void reset(const BasicSlipInput<S>& input) noexcept {

@@ -16,7 +16,6 @@
 
 #include <array>
 #include <cstddef>
-#include <type_traits>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/rig/scalar.hpp"
@@ -35,8 +34,7 @@ class BasicSlipPeakEstimator {
   /// @param slip_min, slip_max  bounds of `width`; 0 < slip_min < slip_max
   /// @param rate_Hz  control cycles per second, > 0
   /// Throws std::invalid_argument for options out of range.
-  BasicSlipPeakEstimator(const SlipPeakOptions<>& options, double slip_min, double slip_max, double rate_Hz)
-    requires std::is_same_v<S, double>;
+  BasicSlipPeakEstimator(const SlipPeakOptions<>& options, double slip_min, double slip_max, double rate_Hz);
 
   void reset() noexcept;
   /// One measured pair, both of the same time, `dt_s` > 0 after the previous pair.

@@ -1,8 +1,6 @@
 // The estimate of theta in (17), in sampled-data form with projection.
 #pragma once
 
-#include <type_traits>
-
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/rig/scalar.hpp"
@@ -52,7 +50,6 @@ class BasicThetaEstimator {
   BasicThetaEstimator() = default;
   /// @param options  gamma, ka1, zeta0, theta_min_N <= theta_max_N; AdaptiveLaw checks them
   BasicThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(wheels)},
         innovation_gain_{options.gamma * options.ka1},
         zeta0_N_{rig::clamped(options.zeta0, options.theta_min_N, options.theta_max_N)},

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <type_traits>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/paper_laws.hpp"
@@ -26,8 +25,7 @@ class BasicWheelForceObserver {
   BasicWheelForceObserver() = default;
   /// @param rate_Hz  control cycles per second, > 0, for the gains; the prediction uses the measured interval
   /// Throws std::invalid_argument for options not > 0.
-  BasicWheelForceObserver(const ForceObserverOptions<>& options, const rig::RigParameters& rig, double rate_Hz)
-    requires std::is_same_v<S, double>;
+  BasicWheelForceObserver(const ForceObserverOptions<>& options, const rig::RigParameters& rig, double rate_Hz);
 
   /// Starts from these speeds with zero force.
   void reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept;

@@ -26,8 +26,7 @@ class BasicEquivalentControl {
  public:
   BasicEquivalentControl() = default;
   /// Throws std::invalid_argument if the control rate or v_min_m_s is not > 0.
-  explicit BasicEquivalentControl(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit BasicEquivalentControl(const ControllerContext& context);
 
   /// @param error_m_s  e_v of `input`
   /// @param theta_N  peak tyre force, known or estimated
