@@ -44,8 +44,8 @@ State state_of(const std::string& bytes) {
   return state;
 }
 
-Component::Component(std::string name, const std::string& token, const std::string& resources, Logger logger)
-    : name_(std::move(name)), token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
+Component::Component(const std::string& token, const std::string& resources, Logger logger)
+    : token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
   if (!model_ || token != token_of(kind_in(token), *model_)) {
     throw std::invalid_argument("the description (token " + token +
                                 ") does not belong to this binary; export the FMU again");

@@ -24,7 +24,7 @@ using State = std::string;
 class Component {
  public:
   /// @param token  what the description says; @param resources  the folder of the FMU's resources
-  Component(std::string name, const std::string& token, const std::string& resources, Logger logger);
+  Component(const std::string& token, const std::string& resources, Logger logger);
 
   [[nodiscard]] const Variable& variable(std::uint32_t reference) const;
   /// The variable, whose value is about to be set. Throws for an output, and after the start for a parameter that is
@@ -44,7 +44,6 @@ class Component {
  private:
   void exchange_state(rig::StateBytes& bytes);
 
-  std::string name_;
   std::string token_;
   std::unique_ptr<Model> model_;
   State first_{};

@@ -43,7 +43,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     }
   };
   try {
-    return new Component(name, token, path_of(resources == nullptr ? "" : resources), logger);
+    return new Component(token, path_of(resources == nullptr ? "" : resources), logger);
   } catch (const std::exception& error) {
     logger(true, error.what());
     return nullptr;
