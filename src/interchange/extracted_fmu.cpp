@@ -43,10 +43,8 @@ constexpr std::array platform_folders{"binaries/linux64/", "binaries/x86_64-linu
 bool leads_out(std::string_view name) {
   if (name.empty() || name.front() == '/' || name.find('\\') != std::string_view::npos) return true;
   if (name.size() > 1 && name[1] == ':') return true;
-  for (const fs::path& part : fs::path(name)) {
-    if (part == "..") return true;
-  }
-  return false;
+  const fs::path path(name);
+  return std::ranges::find(path, "..") != path.end();
 }
 
 bool is_wanted(std::string_view name) {

@@ -17,12 +17,12 @@ constexpr std::uint32_t data_max_bytes = 1U << 28U;  // LCM's own limit
 
 }  // namespace
 
-EventLogReader::EventLogReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(std::fopen(path_.string().c_str(), "rb")) {
+EventLogReader::EventLogReader(std::filesystem::path path) : path_(std::move(path)), file_(path_, std::ios::binary) {
   std::error_code error;
   if (file_) size_ = std::filesystem::file_size(path_, error);
   if (!file_ || error) {
-    throw RecordingError("'" + path_.string() + "': " + (file_ ? "not a regular file" : std::strerror(errno)) +
+    throw RecordingError("'" + path_.string() +
+                         "': " + (file_.is_open() ? "not a regular file" : std::strerror(errno)) +
                          "; give an LCM event log (.lcmlog), as --log writes it");
   }
 }
@@ -34,10 +34,11 @@ std::string EventLogReader::place(const std::string& what) const {
 /// A log ends in the middle of a message. If another message follows, it is a damaged length that says so.
 std::optional<LogEvent> EventLogReader::end_cut_off() {
   if (events_ == 0) fail("not an LCM event log");
-  if (std::fseek(file_.get(), static_cast<long>(at_ + sizeof sync_word), SEEK_SET) != 0) fail(std::strerror(errno));
+  file_.clear();
+  if (!file_.seekg(static_cast<std::streamoff>(at_ + sizeof sync_word))) fail(std::strerror(errno));
   std::uint32_t last = 0;
-  for (int byte = std::getc(file_.get()); byte != EOF; byte = std::getc(file_.get())) {
-    last = last << 8U | static_cast<std::uint32_t>(byte);
+  for (char byte = 0; file_.get(byte);) {
+    last = last << 8U | static_cast<unsigned char>(byte);
     if (last == sync_word) fail("the file is damaged: its length reaches beyond the end, but other events follow");
   }
   cut_ = place("the file is cut off, as that of a program that was killed; it is read up to here");
@@ -46,8 +47,12 @@ std::optional<LogEvent> EventLogReader::end_cut_off() {
 
 std::optional<LogEvent> EventLogReader::next() {
   std::array<std::uint8_t, header_bytes> header{};
-  const std::size_t read = std::fread(header.data(), 1, header.size(), file_.get());
-  if (read == 0 && std::feof(file_.get()) != 0) return std::nullopt;
+  const auto read_into = [this](void* to, std::size_t size) {
+    file_.read(static_cast<char*>(to), static_cast<std::streamsize>(size));
+    return static_cast<std::size_t>(file_.gcount());
+  };
+  const std::size_t read = read_into(header.data(), header.size());
+  if (read == 0 && file_.eof()) return std::nullopt;
   if (read >= sizeof sync_word && boost::endian::load_big_u32(header.data()) != sync_word) {
     fail(events_ == 0 ? "not an LCM event log" : "the file is damaged: no event begins here");
   }
@@ -65,8 +70,8 @@ std::optional<LogEvent> EventLogReader::next() {
   if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) return end_cut_off();
   event.channel.resize(channel_bytes);
   event.data.resize(data_bytes);
-  if (std::fread(event.channel.data(), 1, channel_bytes, file_.get()) != channel_bytes ||
-      std::fread(event.data.data(), 1, data_bytes, file_.get()) != data_bytes) {
+  if (read_into(event.channel.data(), channel_bytes) != channel_bytes ||
+      read_into(event.data.data(), data_bytes) != data_bytes) {
     fail("it changed while it was read");
   }
   at_ += header_bytes + channel_bytes + data_bytes;

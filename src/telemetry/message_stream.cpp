@@ -85,7 +85,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
 void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
   latest_ = record;
   if (!started_ || record.time_s >= next_experiment_s_) {
-    send_experiment();
+    send(experiment_, experiment_message_);
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
   // A replay needs the answer. It may have come from a person or from the simulation.
@@ -188,7 +188,5 @@ void MessageStream::send_status() {
   put_timing(snapshot.timing, m);
   send(status_channel_, m);
 }
-
-void MessageStream::send_experiment() { send(experiment_, experiment_message_); }
 
 }  // namespace abs_hil::telemetry

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
@@ -127,19 +126,6 @@ struct Kind {
 
 namespace {
 
-template <class Model>
-std::optional<Model> model_of(const auto& models) {
-  const auto* model = std::get_if<Model>(&models);
-  return model == nullptr ? std::nullopt : std::optional<Model>(*model);
-}
-
-template <class Run>
-Run run_of(const double* words) {
-  Run run;
-  std::memcpy(static_cast<void*>(&run), words, sizeof(Run));
-  return run;
-}
-
 template <template <class> class Law, template <class> class Tyre, template <class> class Load>
 struct KindOf {
   using Run = BrakingRun<double, Law, Tyre, Load>;
@@ -151,11 +137,11 @@ struct KindOf {
     if constexpr (requires { controller->law().has_lanes(); }) {
       if (!controller->law().has_lanes()) return false;
     }
-    const auto tyre = model_of<Tyre<double>>(plant.tyre);
-    if (!tyre) return false;
-    const auto load =
-        model_of<Load<double>>(plant_sim::make_load_model(job.plant, tyre->peak_mu(), plant.friction_at_most));
-    if (!load) return false;
+    const auto* const tyre = std::get_if<Tyre<double>>(&plant.tyre);
+    if (tyre == nullptr) return false;
+    const auto loads = plant_sim::make_load_model(job.plant, tyre->peak_mu(), plant.friction_at_most);
+    const auto* const load = std::get_if<Load<double>>(&loads);
+    if (load == nullptr) return false;
     const rig::RigParameters& model = parts.settings.model;
     Run run;
     run.rig.tyre = *tyre;
@@ -190,7 +176,8 @@ struct KindOf {
     return true;
   }
   static bool result(const double* words, RunResult& result) {
-    const Run run = run_of<Run>(words);
+    Run run;
+    std::memcpy(static_cast<void*>(&run), words, sizeof(Run));
     if (run.disturbed != 0.0) return false;
     result = {.metrics = analysis::metrics_of(run.figures)};
     return true;
