@@ -11,7 +11,6 @@
 #include <string>
 
 #include "interchange/confinement.hpp"
-#include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {
 
@@ -65,18 +64,12 @@ int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup
     return 2;
   }
   if (!send_json({{"signals", code->signals()}, {"source", code->source()}})) return 2;
-  runtime::MonotonicClock clock;
   HostRequest request;
   while (::recv(host_socket, &request, sizeof request, 0) == static_cast<ssize_t>(sizeof request)) {
     HostAnswer answer{.output = no_output()};
     switch (request.action) {
       case HostAction::reset: code->reset(request.input); break;
-      case HostAction::step: {
-        const std::int64_t before_ns = clock.now_ns();
-        code->step(request.input, answer.output);
-        answer.step_ns = clock.now_ns() - before_ns;
-        break;
-      }
+      case HostAction::step: code->step(request.input, answer.output); break;
       case HostAction::warm_up: answer.times = warm_up(*code, request.period_s, request.count); break;
       case HostAction::probe:
         answer.offences = probe(*code, request, allocations);

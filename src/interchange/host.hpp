@@ -34,7 +34,6 @@ struct HostRequest {
 
 struct HostAnswer {
   abs_hil_output output{};
-  std::int64_t step_ns{0};
   StepTimes times{};
   Offences offences{};
   std::array<char, 128> failure{};  ///< ForeignCode::failure

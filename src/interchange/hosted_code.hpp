@@ -27,8 +27,6 @@ class HostedCode final : public ForeignCode {
   void reset(const abs_hil_input& input) noexcept override;
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override;
   [[nodiscard]] std::string failure() const override { return failure_; }
-  /// Duration of the last step within the other process.
-  [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
 
   [[nodiscard]] StepTimes warm_up_there(double period_s, std::uint32_t steps);
   /// Ends the process as well.
@@ -57,7 +55,6 @@ class HostedCode final : public ForeignCode {
   std::uint64_t steps_{0};      ///< since the last reset
   std::uint64_t all_steps_{0};  ///< of the run
   std::int64_t spent_ns_{0};    ///< waiting for them
-  std::int64_t step_ns_{0};
   std::string failure_{};
 };
 
