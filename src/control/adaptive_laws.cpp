@@ -11,6 +11,28 @@
 
 namespace abs_hil::control {
 
+namespace {
+
+/// Copies this law's gains to the options of AdaptiveLaw, whose parts it shares.
+ControlOptions with_own_gains(const ControlOptions& options) {
+  const AdaptiveActuatorOptions& own = options.adaptive_actuator;
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_weight_s2, "control.adaptive_actuator.");
+  ControlOptions result = options;
+  result.adaptive = own.law;
+  return result;
+}
+
+const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
+  rig::require_valid(o, "control.braking_stiffness.");
+  if (!(o.slip_min <= o.slip_start && o.slip_start <= o.slip_max)) {
+    throw std::invalid_argument("control.braking_stiffness.slip_start must be in [slip_min, slip_max]");
+  }
+  return o;
+}
+
+}  // namespace
+
 template <class S>
 AdaptiveLaw<S>::AdaptiveLaw(const ControllerContext& context)
     : laws_{paper::laws(context.rig.wheels)},
@@ -33,20 +55,6 @@ void AdaptiveLaw<S>::show(SlipOutput& output) const noexcept {
 }
 
 template class AdaptiveLaw<double>;
-
-namespace {
-
-/// Copies this law's gains to the options of AdaptiveLaw, whose parts it shares.
-ControlOptions with_own_gains(const ControlOptions& options) {
-  const AdaptiveActuatorOptions& own = options.adaptive_actuator;
-  rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
-  rig::require_valid(own, &AdaptiveActuatorOptions::lag_weight_s2, "control.adaptive_actuator.");
-  ControlOptions result = options;
-  result.adaptive = own.law;
-  return result;
-}
-
-}  // namespace
 
 template <class S>
 AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
@@ -81,18 +89,6 @@ AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)
 }
 
 template class AdaptivePeakLaw<double>;
-
-namespace {
-
-const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
-  rig::require_valid(o, "control.braking_stiffness.");
-  if (!(o.slip_min <= o.slip_start && o.slip_start <= o.slip_max)) {
-    throw std::invalid_argument("control.braking_stiffness.slip_start must be in [slip_min, slip_max]");
-  }
-  return o;
-}
-
-}  // namespace
 
 template <class S>
 BrakingStiffnessLaw<S>::BrakingStiffnessLaw(const ControllerContext& context)

@@ -9,6 +9,10 @@
 namespace abs_hil::plant_sim {
 namespace {
 
+/// Friction must leave at least this share of the lever's arm L sin phi; below it the normal force would increase more
+/// than tenfold.
+constexpr double least_arm = 0.1;
+
 constexpr double square(double x) noexcept { return x * x; }
 
 }  // namespace
@@ -71,14 +75,6 @@ TyreModel make_tyre_model(const PlantOptions& options) {
   if (options.tyre == "inteco-mu") return IntecoMu(options);
   throw std::invalid_argument("plant.tyre = \"" + options.tyre + "\": give magic-formula or inteco-mu");
 }
-
-namespace {
-
-/// Friction must leave at least this share of the lever's arm L sin phi; below it the normal force would increase more
-/// than tenfold.
-constexpr double least_arm = 0.1;
-
-}  // namespace
 
 template <class S>
 BasicLeverLoad<S>::BasicLeverLoad(const PlantOptions& options, double peak_mu, double friction_at_most)

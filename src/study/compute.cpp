@@ -32,29 +32,6 @@ std::string ending_of(const Outcome& outcome) {
   return outcome.run.stopped() ? "completed," : fmt::format("fault,{}", rig::row_of(outcome.run.fault).name);
 }
 
-}  // namespace
-
-std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome, const std::vector<double>& own) {
-  const RunIndex index = study.index_of(run);
-  const StudyCase& one = study.cases()[index.study_case];
-  std::string row;
-  auto out = std::back_inserter(row);
-  fmt::format_to(out, "{},{},{},{},{},{}", run, rig::csv_field(one.plant), rig::csv_field(one.experiment),
-                 rig::csv_field(study.contenders(index.study_case)[index.contender].name), index.point,
-                 index.repetition);
-  for (std::size_t i = 0; i < study.script().factors.size(); ++i) row += ',' + text_of(study.value_of(index, i));
-  row += ',' + ending_of(outcome);
-  for (const analysis::Figure& figure : analysis::figures) {
-    fmt::format_to(out, ",{}", outcome.refusal.empty() ? figure.of(outcome.run.metrics) : rig::unknown);
-  }
-  for (std::size_t i = 0; i < study.script().metrics.size(); ++i) {
-    fmt::format_to(out, ",{}", own.empty() ? rig::unknown : own[i]);
-  }
-  return row + '\n';
-}
-
-namespace {
-
 /// Runs that are planned at once: enough for the threads to stay busy while the last runs of a chunk end.
 constexpr std::uint64_t runs_at_once = 8192;
 
@@ -121,6 +98,25 @@ void compute_together(const Study& study, const StudyFolder& folder, std::span<c
 }
 
 }  // namespace
+
+std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome, const std::vector<double>& own) {
+  const RunIndex index = study.index_of(run);
+  const StudyCase& one = study.cases()[index.study_case];
+  std::string row;
+  auto out = std::back_inserter(row);
+  fmt::format_to(out, "{},{},{},{},{},{}", run, rig::csv_field(one.plant), rig::csv_field(one.experiment),
+                 rig::csv_field(study.contenders(index.study_case)[index.contender].name), index.point,
+                 index.repetition);
+  for (std::size_t i = 0; i < study.script().factors.size(); ++i) row += ',' + text_of(study.value_of(index, i));
+  row += ',' + ending_of(outcome);
+  for (const analysis::Figure& figure : analysis::figures) {
+    fmt::format_to(out, ",{}", outcome.refusal.empty() ? figure.of(outcome.run.metrics) : rig::unknown);
+  }
+  for (std::size_t i = 0; i < study.script().metrics.size(); ++i) {
+    fmt::format_to(out, ",{}", own.empty() ? rig::unknown : own[i]);
+  }
+  return row + '\n';
+}
 
 std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard& shard) {
   std::vector<std::uint64_t> missing;

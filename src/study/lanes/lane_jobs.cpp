@@ -234,6 +234,22 @@ bool flawed(const plant_sim::PlantOptions& plant) {
          plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
 }
 
+/// Integrates the plant over a cycle that lanes cannot compute.
+void assist(void* runs, const AssistedCycle& cycle, double* state, double* conditions) {
+  Started& run = static_cast<Started*>(runs)[cycle.run];
+  if (!run.plant) run.plant = started_plant(run.job.plant);
+  const auto cycles = std::llround(cycle.time_ns * rig::s_per_ns / cycle.duration_s);
+  plant_sim::StateVector x{};
+  std::copy_n(state, x.size(), x.begin());
+  run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
+  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty, .brake_torque_Nm = cycle.brake_torque_Nm});
+  run.plant_cycles = cycles;
+  x = plant_sim::vector_of(run.plant->state());
+  std::copy(x.begin(), x.end(), state);
+  const LaneConditions<double> now = lane_conditions(run.plant->conditions(), cycle.time_ns);
+  std::memcpy(conditions, &now, sizeof(now));
+}
+
 }  // namespace
 
 InstructionSet instruction_set() {
@@ -316,26 +332,6 @@ const Kind* LaneSettings::begin(Started& run) const {
   }
   return nullptr;
 }
-
-namespace {
-
-/// Integrates the plant over a cycle that lanes cannot compute.
-void assist(void* runs, const AssistedCycle& cycle, double* state, double* conditions) {
-  Started& run = static_cast<Started*>(runs)[cycle.run];
-  if (!run.plant) run.plant = started_plant(run.job.plant);
-  const auto cycles = std::llround(cycle.time_ns * rig::s_per_ns / cycle.duration_s);
-  plant_sim::StateVector x{};
-  std::copy_n(state, x.size(), x.begin());
-  run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
-  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty, .brake_torque_Nm = cycle.brake_torque_Nm});
-  run.plant_cycles = cycles;
-  x = plant_sim::vector_of(run.plant->state());
-  std::copy(x.begin(), x.end(), state);
-  const LaneConditions<double> now = lane_conditions(run.plant->conditions(), cycle.time_ns);
-  std::memcpy(conditions, &now, sizeof(now));
-}
-
-}  // namespace
 
 void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::uint32_t window_cycles) {
   std::vector<double*> words;
