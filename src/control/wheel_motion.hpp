@@ -96,6 +96,5 @@ class BasicBrakeLag {
  private:
   S covered_{1.0};
 };
-using BrakeLag = BasicBrakeLag<double>;
 
 }  // namespace abs_hil::control
