@@ -15,7 +15,8 @@ import tempfile
 BUDGETS = [
     # 1,000 until late samples had to be plausible (some 60) and the controller reported its states and V (some 85).
     ('observers, adaptive controller, gate',
-     ['abs_hil::control::TrackingObserver::update*', 'abs_hil::control::AdaptiveController::step*',
+     ['abs_hil::control::TrackingObserver::update*',
+      'abs_hil::control::LawController<abs_hil::control::AdaptiveLaw>::step*',
       'abs_hil::runtime::CommandGate::check(*'], 1150),
     # 1,500 until the sequence took conditions from experiment files and controllers could be adjusted live (some 40);
     # 1,550 until the brake map was inverted onto the PWM's steps, the controller's output checked for finiteness, gate
@@ -31,7 +32,8 @@ BUDGETS = [
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
     # A bank of 24 curves; nearly the same number of operations in each cycle.
-    ('adaptive-optimal', ['abs_hil::control::AdaptiveOptimalController::step*'], 6000, 'adaptive-optimal'),
+    ('adaptive-optimal', ['abs_hil::control::LawController<abs_hil::control::AdaptiveOptimalLaw>::step*'], 6000,
+     'adaptive-optimal'),
 ]
 
 

@@ -7,7 +7,6 @@
 #include <cstdio>
 
 #include "interchange/host.hpp"
-#include "interchange/host_protocol.hpp"
 
 namespace {
 std::uint64_t allocations = 0;

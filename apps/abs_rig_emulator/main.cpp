@@ -88,8 +88,8 @@ void add_board_options(cli::Parser& parser, program::EmulatorOptions& emulator) 
   cli::Parser board = parser.add_group("board", "the board of the rig", {.least = 1, .most = 1});
   board.add("--pci-root", &emulator.pci_root, "emulate a card: folder at which to mount its tree; created if missing",
             {.type = "DIR"});
-  board.add("--can", &emulator.can_interface, "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on",
-            {.type = "IFACE"});
+  board.add("--can", &emulator.can_interface,
+            "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on", {.type = "IFACE"});
   board.add("--usb", &emulator.use_usb, "emulate a USB board, plugged into this computer's vhci_hcd (needs root)");
   board.add("--hm2", &emulator.hm2_address,
             "emulate a Mesa 7I92T: address at which it takes datagrams, with a port if it is not 27181",
@@ -100,9 +100,11 @@ void add_board_options(cli::Parser& parser, program::EmulatorOptions& emulator) 
 
 void add_options(cli::Parser& parser, Arguments& a) {
   add_board_options(parser, a.emulator);
-  parser.add("--watchdog-ms", &a.emulator.watchdog_ms, "watchdog of the CAN node, ms, until an activation sets another value",
+  parser.add("--watchdog-ms", &a.emulator.watchdog_ms,
+             "watchdog of the CAN node, ms, until an activation sets another value",
              {.range = {1, 10'000}, .show_default = true});
-  shown(parser, "--bdf", &a.emulator.bdfs, "the card's address; give it again for more cards, without a rig behind them");
+  shown(parser, "--bdf", &a.emulator.bdfs,
+        "the card's address; give it again for more cards, without a rig behind them");
   shown(parser, "--plant", &a.plant, "plant by name or TOML file");
   parser.add("--set", &a.assignments, "any plant value, for example plant.theta_N=30", {.repeated = true});
   shown(parser, "--seed", &a.emulator.seed, "seed of intermittent faults and garbage");

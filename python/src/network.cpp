@@ -19,7 +19,6 @@
 
 #include "commands/authority.hpp"
 #include "commands/sender.hpp"
-#include "interchange/agent_controller.hpp"
 #include "interchange/foreign_controller.hpp"
 #include "interchange/host.hpp"
 #include "interchange/hosted_code.hpp"
@@ -112,7 +111,6 @@ py::dict controller_files(const std::string& program) {
   for (const control::ControllerFiles& files : interchange::foreign_controllers()) {
     makers[py::str(files.ending.data(), files.ending.size())] = py::capsule(reinterpret_cast<void*>(files.make));
   }
-  makers[".agent"] = py::capsule(reinterpret_cast<void*>(interchange::agent_controllers().make));
   return makers;
 }
 

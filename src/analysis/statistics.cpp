@@ -1,4 +1,4 @@
-// Means with confidence intervals, quantiles and Student's t.
+// Means with confidence intervals by Student's t, and quantiles.
 #include "analysis/statistics.hpp"
 
 #include <algorithm>
@@ -22,10 +22,6 @@ void require_pairs(std::span<const double> values, std::span<const double> base)
 
 }  // namespace
 
-double student_t_quantile(double probability, double degrees_of_freedom) {
-  return boost::math::quantile(boost::math::students_t(degrees_of_freedom), probability);
-}
-
 Estimate estimate_mean(std::span<const double> values) {
   Estimate result{.mean = missing, .standard_deviation = missing, .low = missing, .high = missing};
   double sum = 0.0;
@@ -43,7 +39,8 @@ Estimate estimate_mean(std::span<const double> values) {
     if (!std::isnan(value)) squares += (value - result.mean) * (value - result.mean);
   }
   result.standard_deviation = std::sqrt(squares / (n - 1.0));
-  const double half = student_t_quantile(upper_probability, n - 1.0) * result.standard_deviation / std::sqrt(n);
+  const double t = boost::math::quantile(boost::math::students_t(n - 1.0), upper_probability);
+  const double half = t * result.standard_deviation / std::sqrt(n);
   result.low = result.mean - half;
   result.high = result.mean + half;
   return result;

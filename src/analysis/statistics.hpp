@@ -15,9 +15,6 @@ struct Estimate {
   [[nodiscard]] double half_width() const noexcept { return 0.5 * (high - low); }
 };
 
-/// Quantile of Student's t distribution. @param probability  in (0, 1) @param degrees_of_freedom  >= 1
-[[nodiscard]] double student_t_quantile(double probability, double degrees_of_freedom);
-
 /// Mean of the values that are not NaN.
 [[nodiscard]] Estimate estimate_mean(std::span<const double> values);
 

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <stdexcept>
+#include <string>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/paper_laws.hpp"
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -15,6 +18,19 @@ namespace abs_hil::control {
 /// Returns the options unchanged. Throws std::invalid_argument, naming the option, if gamma, ka1 or zeta0 is out of its
 /// range or theta_min_N > theta_max_N. Not real-time safe.
 [[nodiscard]] const AdaptiveOptions& checked(const AdaptiveOptions& options);
+
+/// Returns the options of a law that seeks the slip, unchanged. Throws std::invalid_argument, naming the option, if one
+/// is out of its range, or slip_start not in [slip_min, slip_max]. Not real-time safe.
+/// @param section  of the keys, with its dot
+template <class Options>
+[[nodiscard]] const Options& with_sound_slips(const Options& o, const std::string& section) {
+  rig::require_valid(o, section);
+  if (!(o.slip_min < o.slip_max))
+    throw std::invalid_argument(section + "slip_min must be below " + section + "slip_max");
+  if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max))
+    throw std::invalid_argument(section + "slip_start must be in [slip_min, slip_max]");
+  return o;
+}
 
 /// P and Q of Theorem 3.1. Throws std::invalid_argument as `paper_gains` does. Not real-time safe.
 [[nodiscard]] paper::Weights<double> paper_weights(const AdaptiveOptions& options);

@@ -1,5 +1,4 @@
-// Makes the adaptive laws from their options and refuses options out of range; the signals that they show.
-#include <array>
+// Makes the adaptive laws from their options and refuses options out of range; the signals of the first.
 #include <cmath>
 #include <stdexcept>
 
@@ -12,52 +11,9 @@
 
 namespace abs_hil::control {
 
-template <class S>
-AdaptiveLaw<S>::AdaptiveLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
-    : laws_{paper::laws(context.rig.wheels)},
-      tyre_{context.rig.tyre},
-      theta_model_N_{context.rig.tyre.theta_N},
-      dynamics_{context},
-      gains_{paper_gains(context.options.adaptive)},
-      weights_{paper_weights(context.options.adaptive)},
-      theta_{context.options.adaptive, context.rig.wheels} {}
-
-/// In the order of `signals`.
-template <class S>
-rig::SignalValues AdaptiveLaw<S>::states(double error_m_s) const noexcept
-  requires std::is_same_v<S, double>
-{
-  using Laws = paper::Laws<double>;
-  const double I = integral_.value_m();
-  const double theta_err_N = theta_model_N_ - theta_.theta_N();
-  return {I, theta_.omega1_hat_rad_s(omega1_rad_s_), theta_.zeta_N(),
-          Laws::V(gains_, weights_, I, error_m_s, theta_err_N),
-          Laws::V_dot(gains_, weights_, I, error_m_s, past_phi_, theta_err_N)};
-}
-
-template class AdaptiveLaw<double>;
-
-SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
-  SlipOutput output = law_.step(input);
-  output.signals = law_.states(output.slip_velocity_error_m_s);
-  return output;
-}
-
-std::span<const rig::Signal> AdaptiveController::signals() const noexcept {
-  static constexpr std::array<rig::Signal, 5> rows{{
-      {"I_m", "integral of the slip velocity error, I of (17), in m"},
-      {"omega1_hat_rad_s", "upper wheel's speed in the estimator of (17), in rad/s"},
-      {"zeta_N", "zeta of (17), in N"},
-      {"V", "Lyapunov function of Theorem 3.1, with the model's theta"},
-      {"V_dot", "its derivative V' by the theorem, with the model's theta and phi of the past interval"},
-  }};
-  return rows;
-}
-
 namespace {
 
-/// Copies this controller's gains to the options of AdaptiveController, whose parts it shares.
+/// Copies this law's gains to the options of AdaptiveLaw, whose parts it shares.
 ControlOptions with_own_gains(const ControlOptions& options) {
   const AdaptiveActuatorOptions& own = options.adaptive_actuator;
   rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
@@ -67,11 +23,41 @@ ControlOptions with_own_gains(const ControlOptions& options) {
   return result;
 }
 
+const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
+  rig::require_valid(o, "control.braking_stiffness.");
+  if (!(o.slip_min <= o.slip_start && o.slip_start <= o.slip_max)) {
+    throw std::invalid_argument("control.braking_stiffness.slip_start must be in [slip_min, slip_max]");
+  }
+  return o;
+}
+
 }  // namespace
 
 template <class S>
+AdaptiveLaw<S>::AdaptiveLaw(const ControllerContext& context)
+    : laws_{paper::laws(context.rig.wheels)},
+      tyre_{context.rig.tyre},
+      theta_model_N_{context.rig.tyre.theta_N},
+      dynamics_{context},
+      gains_{paper_gains(context.options.adaptive)},
+      weights_{paper_weights(context.options.adaptive)},
+      theta_{context.options.adaptive, context.rig.wheels} {}
+
+template <class S>
+void AdaptiveLaw<S>::show(SlipOutput& output) const noexcept {
+  using Laws = paper::Laws<double>;
+  const double I = integral_.value_m();
+  const double error_m_s = output.slip_velocity_error_m_s;
+  const double theta_err_N = theta_model_N_ - theta_.theta_N();
+  output.signals = {I, theta_.omega1_hat_rad_s(omega1_rad_s_), theta_.zeta_N(),
+                    Laws::V(gains_, weights_, I, error_m_s, theta_err_N),
+                    Laws::V_dot(gains_, weights_, I, error_m_s, past_phi_, theta_err_N)};
+}
+
+template class AdaptiveLaw<double>;
+
+template <class S>
 AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       tyre_{context.rig.tyre},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -87,28 +73,13 @@ AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
 
 template class AdaptiveActuatorLaw<double>;
 
-namespace {
-
-const AdaptivePeakOptions<>& checked(const AdaptivePeakOptions<>& o) {
-  rig::require_valid(o, "control.adaptive_peak.");
-  if (!(o.slip_min < o.slip_max))
-    throw std::invalid_argument("control.adaptive_peak.slip_min must be below control.adaptive_peak.slip_max");
-  if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
-    throw std::invalid_argument("control.adaptive_peak.slip_start must be in [slip_min, slip_max]");
-  }
-  return o;
-}
-
-}  // namespace
-
 template <class S>
 AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
       period_s_{1.0 / context.options.rate_Hz},
-      options_{checked(context.options.adaptive_peak)} {
+      options_{with_sound_slips(context.options.adaptive_peak, "control.adaptive_peak.")} {
   const auto& o = options_;
   gains_.ks0 = o.ks0;
   gains_.ks1 = o.ks1;
@@ -119,21 +90,8 @@ AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)
 
 template class AdaptivePeakLaw<double>;
 
-namespace {
-
-const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
-  rig::require_valid(o, "control.braking_stiffness.");
-  if (!(o.slip_min <= o.slip_start && o.slip_start <= o.slip_max)) {
-    throw std::invalid_argument("control.braking_stiffness.slip_start must be in [slip_min, slip_max]");
-  }
-  return o;
-}
-
-}  // namespace
-
 template <class S>
 BrakingStiffnessLaw<S>::BrakingStiffnessLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -146,17 +104,5 @@ BrakingStiffnessLaw<S>::BrakingStiffnessLaw(const ControllerContext& context)
 }
 
 template class BrakingStiffnessLaw<double>;
-
-SlipOutput BrakingStiffnessController::step(const SlipInput& input) noexcept {
-  SlipOutput output = law_.step(input);
-  output.signals[0] = law_.elasticity();
-  return output;
-}
-
-std::span<const rig::Signal> BrakingStiffnessController::signals() const noexcept {
-  static constexpr std::array<rig::Signal, 1> rows{
-      {{"elasticity", "estimated relative growth of the tyre force per relative growth of the slip"}}};
-  return rows;
-}
 
 }  // namespace abs_hil::control

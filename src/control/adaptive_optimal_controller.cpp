@@ -2,29 +2,16 @@
 #include "control/adaptive_optimal_controller.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
-#include "abs_hil/rig/option_check.hpp"
+#include "control/adaptive_gains.hpp"
 
 namespace abs_hil::control {
 namespace {
 
 // The curve is learnt about this often, however short the cycles are: more readings of the same counts say no more.
 constexpr double learning_rate_Hz = 1000.0;
-
-const AdaptiveOptimalOptions<>& checked(const AdaptiveOptimalOptions<>& o) {
-  rig::require_valid(o, "control.adaptive_optimal.");
-  if (!(o.slip_min < o.slip_max)) {
-    throw std::invalid_argument("control.adaptive_optimal.slip_min must be below control.adaptive_optimal.slip_max");
-  }
-  if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
-    throw std::invalid_argument("control.adaptive_optimal.slip_start must be in [slip_min, slip_max]");
-  }
-  return o;
-}
 
 /// Amplitude of the early search with coarse counts, as a part of the reference.
 constexpr double coarse_early_part = 0.5;
@@ -62,8 +49,8 @@ ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters
 
 template <class S>
 AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
-  requires std::is_same_v<S, double>
-    : options_{counted(checked(context.options.adaptive_optimal), coarseness(context.rig))},
+    : options_{counted(with_sound_slips(context.options.adaptive_optimal, "control.adaptive_optimal."),
+                       coarseness(context.rig))},
       laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
@@ -77,9 +64,7 @@ AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
       bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 template <class S>
-void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
-  requires std::is_same_v<S, double>
-{
+void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
   observer_.reset(input.speeds);
   force_.reset(input.speeds.omega2_rad_s);
   const double turning_Nm = laws_.J1 * input.alpha1_rad_s2 + laws_.d1 * input.speeds.omega1_rad_s + laws_.M10;
@@ -95,26 +80,5 @@ void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept
 }
 
 template class AdaptiveOptimalLaw<double>;
-
-SlipOutput AdaptiveOptimalController::step(const SlipInput& input) noexcept {
-  SlipOutput output = law_.step(input);
-  output.signals[0] = law_.bank().peak_slip();
-  output.signals[1] = law_.bank().slip_zero();
-  output.signals[2] = law_.bank().jumps();
-  return output;
-}
-
-std::span<const rig::Signal> AdaptiveOptimalController::signals() const noexcept {
-  static constexpr std::array<rig::Signal, 3> rows{{
-      {"peak_slip", "estimated slip of the largest tyre force"},
-      {"slip_zero", "estimated error of the slip: the true one less the one that is read"},
-      {"friction_jumps", "jumps of friction seen since braking began"},
-  }};
-  return rows;
-}
-
-std::vector<Learnt> AdaptiveOptimalController::learnt() const {
-  return {{"control.adaptive_optimal.last_peak_slip", law_.bank().learnt_peak_slip()}};
-}
 
 }  // namespace abs_hil::control

@@ -30,7 +30,6 @@ class LockedLaw {
 
   LockedLaw() = default;
   explicit LockedLaw(const ControllerContext& context) noexcept
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, brake_{context.rig.brake} {}
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept {}
@@ -46,8 +45,6 @@ class LockedLaw {
   rig::BasicBrake<S> brake_{};
 };
 
-using LockedController = LawController<LockedLaw>;
-
 /// Relay as in the rig maker's demonstration: no torque while the slip is above a threshold, otherwise full torque (as
 /// LockedLaw). It has no state and so no hysteresis. theta_est_N is NaN.
 template <class S>
@@ -58,7 +55,6 @@ class RelayLaw {
   RelayLaw() = default;
   /// Throws std::invalid_argument for a threshold outside [0, 1).
   explicit RelayLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, brake_{context.rig.brake}, threshold_{context.options.relay.threshold} {
     rig::require_valid(context.options.relay, "control.relay.");
   }
@@ -78,8 +74,6 @@ class RelayLaw {
   rig::BasicBrake<S> brake_{};
   S threshold_{0.0};
 };
-
-using RelayController = LawController<RelayLaw>;
 
 /// Brake torque that keeps e_v constant by (14): (J1/r1)(k F + friction drift). The lower wheel's deceleration gives
 /// the tyre force F = -(J2 omega2' + d2 omega2 + M20)/r2, taken as >= 0. This needs no tyre model and no theta.
@@ -106,7 +100,6 @@ class PiLaw {
   PiLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit PiLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         kp_per_s_{-std::expm1(-context.options.pi.kp_per_s / context.options.rate_Hz) * context.options.rate_Hz},
         ki_per_s2_{context.options.pi.ki_per_s2},
@@ -135,8 +128,6 @@ class PiLaw {
   BasicSlipErrorIntegral<S> integral_{};
 };
 
-using PiController = LawController<PiLaw>;
-
 /// Mixed slip-deceleration control (Savaresi, Tanelli and Cantoni, 2007): a PI controller holds
 ///   slip + weight * (deceleration of the upper wheel's circumference in g)
 /// at one value. With a constant wheel slip the wheel decelerates as the car does, so the held slip is smaller where
@@ -150,7 +141,6 @@ class MixedSlipDecelerationLaw {
   MixedSlipDecelerationLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit MixedSlipDecelerationLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},
         options_{context.options.mixed_slip_deceleration} {
@@ -158,7 +148,19 @@ class MixedSlipDecelerationLaw {
   }
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept { integral_Nm_ = S(0.0); }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
+    constexpr double g_m_s2 = 9.81;
+    const S deceleration =
+        rig::select(turns(input.speeds.omega1_rad_s), S(-laws_.r1 * input.alpha1_rad_s2 / g_m_s2), S(0.0));
+    const S error = options_.target - (input.slip + options_.weight * deceleration);
+    const S full_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
+    // Where less was sent than asked for, the integral must not grow, and the other way round.
+    const S integral_Nm = rig::clamped(S(integral_Nm_ + options_.ki_Nm_s * error * input.dt_s), S(0.0), full_Nm);
+    integral_Nm_ = rig::select(input.unsent_torque_Nm * error > 0.0, integral_Nm_, integral_Nm);
+    return {.brake_torque_Nm = rig::clamped(S(options_.kp_Nm * error + integral_Nm_), S(0.0), full_Nm),
+            .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
+            .theta_est_N = rig::unknown};
+  }
   void take_over(const MixedSlipDecelerationLaw& before) noexcept { integral_Nm_ = before.integral_Nm_; }
 
  private:
@@ -167,22 +169,5 @@ class MixedSlipDecelerationLaw {
   MixedSlipDecelerationOptions<S> options_{};
   S integral_Nm_{0.0};
 };
-
-template <class S>
-BasicSlipOutput<S> MixedSlipDecelerationLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
-  constexpr double g_m_s2 = 9.81;
-  const S deceleration =
-      rig::select(turns(input.speeds.omega1_rad_s), S(-laws_.r1 * input.alpha1_rad_s2 / g_m_s2), S(0.0));
-  const S error = options_.target - (input.slip + options_.weight * deceleration);
-  const S full_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
-  // Where less was sent than asked for, the integral must not grow, and the other way round.
-  const S integral_Nm = rig::clamped(S(integral_Nm_ + options_.ki_Nm_s * error * input.dt_s), S(0.0), full_Nm);
-  integral_Nm_ = rig::select(input.unsent_torque_Nm * error > 0.0, integral_Nm_, integral_Nm);
-  return {.brake_torque_Nm = rig::clamped(S(options_.kp_Nm * error + integral_Nm_), S(0.0), full_Nm),
-          .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
-          .theta_est_N = rig::unknown};
-}
-
-using MixedSlipDecelerationController = LawController<MixedSlipDecelerationLaw>;
 
 }  // namespace abs_hil::control

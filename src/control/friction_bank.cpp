@@ -31,7 +31,6 @@ double number(const auto& row, std::size_t j) noexcept { return row.v[j / 2][j %
 
 template <class S>
 BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions<>& o, double rate_Hz, double quick_delay_s)
-  requires std::is_same_v<S, double>
     : options_{o}, rate_Hz_{rate_Hz}, quick_delay_s_{quick_delay_s} {
   rig::require_valid(o, "control.adaptive_optimal.");
   if (!(rate_Hz > 0.0 && quick_delay_s > 0.0)) {
@@ -57,9 +56,7 @@ BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions<>& o, double r
 }
 
 template <class S>
-void BasicFrictionBank<S>::reset(const Start& start) noexcept
-  requires std::is_same_v<S, double>
-{
+void BasicFrictionBank<S>::reset(const Start& start) noexcept {
   using friction_bank::zero_max, friction_bank::zero_move_max;
   const double zero = std::clamp(-start.slip, -zero_max, zero_max);
   const double spread = std::sqrt(square(options_.zero_error_m_s) + square(start.swing_m_s)) / start.car_speed_m_s +
@@ -81,9 +78,7 @@ void BasicFrictionBank<S>::reset(const Start& start) noexcept
 }
 
 template <class S>
-double BasicFrictionBank<S>::learnt_peak_slip() const noexcept
-  requires std::is_same_v<S, double>
-{
+double BasicFrictionBank<S>::learnt_peak_slip() const noexcept {
   double mean = 0.0;
   for (const Members& m : bank_) {
     for (std::size_t j = 0; j < peaks; ++j) mean += number(m.weight, j) * rig::logarithm(friction_curves::peak[j]);

@@ -53,8 +53,7 @@ class BasicFrictionBank {
   BasicFrictionBank() = default;
   /// @param quick_delay_s  by which `Data::quick_force_N` follows the force, > 0
   /// Throws std::invalid_argument for options out of range.
-  BasicFrictionBank(const FrictionBankOptions<>& options, double rate_Hz, double quick_delay_s)
-    requires std::is_same_v<S, double>;
+  BasicFrictionBank(const FrictionBankOptions<>& options, double rate_Hz, double quick_delay_s);
 
   /// Amplitudes of the once-a-turn errors that encoder discs off their centres may cause; 0: the discs are known.
   struct Swing {
@@ -82,8 +81,7 @@ class BasicFrictionBank {
     double force_N{0.0};        ///< of the tyre
     double swing_m_s{0.0};      ///< of the difference of both speeds, by their discs
   };
-  void reset(const Start& start) noexcept
-    requires std::is_same_v<S, double>;
+  void reset(const Start& start) noexcept;
   void learn(const Data& data) noexcept;
 
   struct Force {
@@ -105,8 +103,7 @@ class BasicFrictionBank {
   [[nodiscard]] const S& peak_force_N() const noexcept { return peak_force_N_; }
   /// Somewhat less than the geometric mean of the members' peaks: what the next braking on the same tyre may begin
   /// with. Not for the cycle.
-  [[nodiscard]] double learnt_peak_slip() const noexcept
-    requires std::is_same_v<S, double>;
+  [[nodiscard]] double learnt_peak_slip() const noexcept;
   /// Force of the curve at the readings, delayed as the quick force is.
   [[nodiscard]] const S& late_force_N() const noexcept { return late_force_N_; }
   [[nodiscard]] auto jumping() const noexcept { return hold_s_ > 0.0; }

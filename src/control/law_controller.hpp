@@ -9,8 +9,10 @@
 namespace abs_hil::control {
 
 /// The slip controller of a law that is written over its scalar: `Law<double>` runs in the cycle, a `Law` of packs in
-/// many simulated runs side by side. A law has `reset` and `step` as SlipController has them, `take_over` if it
-/// can, and nothing but scalars of type S as members.
+/// many simulated runs side by side. A law has `reset` and `step` as SlipController has them, `take_over` if it can,
+/// and nothing but scalars of type S as members. Only a `Law<double>` is made from a context. With signals of its own
+/// it has the table `signals`, and `show`, which writes their values into an output of `step`; `learnt` if a braking
+/// leaves something.
 template <template <class> class Law>
 class LawController : public SlipController {
  public:
@@ -18,7 +20,19 @@ class LawController : public SlipController {
   explicit LawController(const ControllerContext& context) : law_{context} {}
 
   void reset(const SlipInput& input) noexcept override { law_.reset(input); }
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override { return law_.step(input); }
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override {
+    SlipOutput output = law_.step(input);
+    if constexpr (has_signals) law_.show(output);
+    return output;
+  }
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override {
+    if constexpr (has_signals) return Law<double>::signals;
+    return {};
+  }
+  [[nodiscard]] std::vector<Learnt> learnt() const override {
+    if constexpr (requires(const Law<double>& law) { law.learnt(); }) return law_.learnt();
+    return {};
+  }
   [[nodiscard]] bool take_over(const SlipController& before) noexcept override {
     if constexpr (requires(const Law<double>& other) { law_.take_over(other); }) {
       const auto* other = dynamic_cast<const LawController*>(&before);
@@ -38,7 +52,9 @@ class LawController : public SlipController {
 
   [[nodiscard]] const Law<double>& law() const noexcept { return law_; }
 
- protected:
+ private:
+  static constexpr bool has_signals = requires { Law<double>::signals; };
+
   Law<double> law_;
 };
 

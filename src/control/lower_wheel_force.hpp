@@ -9,7 +9,6 @@
 #pragma once
 
 #include <array>
-#include <type_traits>
 
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/parameters.hpp"
@@ -63,7 +62,6 @@ class BasicLowerWheelForce {
   BasicLowerWheelForce() = default;
   /// @param bandwidth_rad_s  of the lags, > 0
   BasicLowerWheelForce(const rig::WheelParameters& wheels, double bandwidth_rad_s) noexcept
-    requires std::is_same_v<S, double>
       : J2_kg_m2_{wheels.J2_kg_m2},
         d2_Nms_rad_{wheels.d2_Nms_rad},
         M20_Nm_{wheels.M20_Nm},

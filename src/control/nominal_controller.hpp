@@ -19,7 +19,6 @@ class NominalLaw {
   NominalLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit NominalLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)},
         tyre_{context.rig.tyre},
         dynamics_{context},
@@ -48,7 +47,5 @@ class NominalLaw {
   S theta0_N_{0.0};
   BasicSlipErrorIntegral<S> integral_{};
 };
-
-using NominalController = LawController<NominalLaw>;
 
 }  // namespace abs_hil::control

@@ -22,32 +22,34 @@
 namespace abs_hil::control {
 namespace {
 
+template <template <class> class Law>
+constexpr ControllerEntry law_entry(std::string_view name, std::string_view summary) noexcept {
+  return controller_entry<LawController<Law>>(name, summary);
+}
+
 /// A new controller needs a pair of files and one line here (docs/writing-a-controller.md).
 constexpr std::array own_table{
-    controller_entry<AdaptiveController>(
-        "adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
-    controller_entry<AdaptiveActuatorController>("adaptive-actuator",
-                                                 "adaptive slip control that steps back through the brake's lag (6)"),
-    controller_entry<AdaptivePeakController>("adaptive-peak",
-                                             "seeks the slip of peak friction by itself, told nothing of the tyre"),
-    controller_entry<AdaptiveOptimalController>(
+    law_entry<AdaptiveLaw>("adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
+    law_entry<AdaptiveActuatorLaw>("adaptive-actuator",
+                                   "adaptive slip control that steps back through the brake's lag (6)"),
+    law_entry<AdaptivePeakLaw>("adaptive-peak", "seeks the slip of peak friction by itself, told nothing of the tyre"),
+    law_entry<AdaptiveOptimalLaw>(
         "adaptive-optimal", "brakes at the unknown peak of friction, and moves the brake as little as that allows"),
-    controller_entry<NominalController>("nominal", "slip control with a known peak tyre force: (16) of the paper"),
-    controller_entry<SlidingModeController>("sliding-mode",
-                                            "textbook sliding mode, the paper's own baseline is not public: chatters"),
-    controller_entry<SmoothSlidingModeController>("sliding-mode-smooth", "sliding mode with a boundary layer"),
-    controller_entry<SlidingModeActuatorController>("sliding-mode-actuator",
-                                                    "sliding mode that steps back through the brake's lag (6)"),
-    controller_entry<SuperTwistingController>("super-twisting", "second-order sliding mode with a continuous torque"),
-    controller_entry<PiController>("pi", "speed-scheduled PI with the measured tyre force fed forward"),
-    controller_entry<MixedSlipDecelerationController>("mixed-slip-deceleration",
-                                                      "PI on a sum of slip and wheel deceleration, estimates nothing"),
-    controller_entry<BrakingStiffnessController>("braking-stiffness",
-                                                 "raises the slip while the measured tyre force still grows with it"),
-    controller_entry<RelayController>("relay",
-                                      "brake on below a slip threshold, off above: the rig maker's demonstration"),
-    controller_entry<FivePhaseController>("five-phase", "production-style wheel deceleration thresholds, no slip"),
-    controller_entry<LockedController>("locked", "full brake torque throughout: the reference without ABS"),
+    law_entry<NominalLaw>("nominal", "slip control with a known peak tyre force: (16) of the paper"),
+    law_entry<SlidingModeLaw>("sliding-mode",
+                              "textbook sliding mode, the paper's own baseline is not public: chatters"),
+    law_entry<SmoothSlidingModeLaw>("sliding-mode-smooth", "sliding mode with a boundary layer"),
+    law_entry<SlidingModeActuatorLaw>("sliding-mode-actuator",
+                                      "sliding mode that steps back through the brake's lag (6)"),
+    law_entry<SuperTwistingLaw>("super-twisting", "second-order sliding mode with a continuous torque"),
+    law_entry<PiLaw>("pi", "speed-scheduled PI with the measured tyre force fed forward"),
+    law_entry<MixedSlipDecelerationLaw>("mixed-slip-deceleration",
+                                        "PI on a sum of slip and wheel deceleration, estimates nothing"),
+    law_entry<BrakingStiffnessLaw>("braking-stiffness",
+                                   "raises the slip while the measured tyre force still grows with it"),
+    law_entry<RelayLaw>("relay", "brake on below a slip threshold, off above: the rig maker's demonstration"),
+    law_entry<FivePhaseLaw>("five-phase", "production-style wheel deceleration thresholds, no slip"),
+    law_entry<LockedLaw>("locked", "full brake torque throughout: the reference without ABS"),
 };
 
 std::vector<ControllerEntry>& table() noexcept {

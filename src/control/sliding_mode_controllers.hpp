@@ -21,7 +21,6 @@ class SlidingModeLaw {
   SlidingModeLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.sliding_mode.adaptation},
         gain_m_s2_{context.options.sliding_mode.gain_m_s2},
         reaching_per_s_{context.options.sliding_mode.reaching_per_s} {
@@ -44,8 +43,6 @@ class SlidingModeLaw {
   S gain_m_s2_{0.0};
   S reaching_per_s_{0.0};
 };
-
-using SlidingModeController = LawController<SlidingModeLaw>;
 
 /// Closed-form solution e_v of e_v' = -K sat(e_v/width) after `time_s`. |e_v| falls at the rate K outside the boundary
 /// layer of that width, and exponentially inside it. Real-time safe.
@@ -81,7 +78,6 @@ class SmoothSlidingModeLaw {
   SmoothSlidingModeLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SmoothSlidingModeLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.sliding_mode_smooth.adaptation},
         gain_m_s2_{context.options.sliding_mode_smooth.gain_m_s2},
         width_m_s_{context.options.sliding_mode_smooth.boundary_m_s} {
@@ -102,8 +98,6 @@ class SmoothSlidingModeLaw {
   S gain_m_s2_{0.0};
   S width_m_s_{0.0};
 };
-
-using SmoothSlidingModeController = LawController<SmoothSlidingModeLaw>;
 
 /// One period of the super-twisting algorithm e' = -k1 sqrt|e| sign(e) + z, z' = -k2 sign(e).
 template <class S>
@@ -143,7 +137,6 @@ class SuperTwistingLaw {
   SuperTwistingLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SuperTwistingLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>
       : surface_{context, context.options.super_twisting.adaptation},
         k1_{context.options.super_twisting.k1},
         k2_{context.options.super_twisting.k2} {
@@ -177,7 +170,5 @@ class SuperTwistingLaw {
   S k2_{0.0};
   S integral_m_s2_{0.0};
 };
-
-using SuperTwistingController = LawController<SuperTwistingLaw>;
 
 }  // namespace abs_hil::control

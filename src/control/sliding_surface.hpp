@@ -2,7 +2,6 @@
 #pragma once
 
 #include <stdexcept>
-#include <type_traits>
 
 #include "abs_hil/control/equivalent_control.hpp"
 #include "abs_hil/control/options.hpp"
@@ -23,7 +22,6 @@ class BasicSwitchingThetaEstimator {
   BasicSwitchingThetaEstimator() = default;
   /// Throws std::invalid_argument for a gain or bounds out of range.
   explicit BasicSwitchingThetaEstimator(const SwitchingAdaptationOptions<>& options)
-    requires std::is_same_v<S, double>
       : options_{options}, theta_N_{options.theta0_N} {
     rig::require_valid(options, "");
     if (!(options.theta_min_N <= options.theta0_N && options.theta0_N <= options.theta_max_N)) {
@@ -65,7 +63,6 @@ class BasicSlidingSurface {
   BasicSlidingSurface() = default;
   /// Throws std::invalid_argument for options out of range.
   BasicSlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions<>& adaptation)
-    requires std::is_same_v<S, double>
       : laws_{paper::laws(context.rig.wheels)}, tyre_{context.rig.tyre}, equivalent_{context}, theta_{adaptation} {}
 
   void reset(const BasicSlipInput<S>& input) noexcept {
@@ -85,11 +82,26 @@ class BasicSlidingSurface {
   /// Adapts theta_hat over the past interval. theta_hat is held if the torque sent was not the reference torque and
   /// adaptation would drive the two further apart (anti-windup).
   /// @return e_v now
-  [[nodiscard]] S observe(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] S observe(const BasicSlipInput<S>& input) noexcept {
+    past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
+    slip_ = input.slip;
+    excess_ = input.unsent_torque_Nm;
+    // theta_hat changes by -phi s, and the torque by phi times this change.
+    const S gain_phi = laws_.k({.lambda_ref = input.slip_ref}) * past_phi_;
+    theta_.update(!winds_up(S(-switching_)), input.dt_s, gain_phi, switching_);
+    return slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+  }
   /// The torque that moves e_v, now `error_m_s`, along the reference motion.
   /// @param switching  s for theta_hat over the coming interval, in [-1, 1]
   [[nodiscard]] BasicSlipOutput<S> drive(const BasicSlipInput<S>& input, const S& error_m_s,
-                                         const BasicWantedMotion<S>& wanted, const S& switching) noexcept;
+                                         const BasicWantedMotion<S>& wanted, const S& switching) noexcept {
+    const S torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
+    switching_ = switching;
+    // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
+    const auto outside = torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0;
+    excess_ = rig::select(outside, torque_Nm, excess_);
+    return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+  }
 
   /// True if the last torque is not sent as it is and a change of this sign would drive it further out.
   [[nodiscard]] auto winds_up(const S& torque_change) const noexcept { return excess_ * torque_change > 0.0; }
@@ -105,27 +117,5 @@ class BasicSlidingSurface {
   S switching_{0.0};
   S excess_{0.0};  ///< > 0: less is sent than the reference torque, < 0: more is sent, 0: neither
 };
-
-template <class S>
-S BasicSlidingSurface<S>::observe(const BasicSlipInput<S>& input) noexcept {
-  past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
-  slip_ = input.slip;
-  excess_ = input.unsent_torque_Nm;
-  // theta_hat changes by -phi s, and the torque by phi times this change.
-  const S gain_phi = laws_.k({.lambda_ref = input.slip_ref}) * past_phi_;
-  theta_.update(!winds_up(S(-switching_)), input.dt_s, gain_phi, switching_);
-  return slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
-}
-
-template <class S>
-BasicSlipOutput<S> BasicSlidingSurface<S>::drive(const BasicSlipInput<S>& input, const S& error_m_s,
-                                                 const BasicWantedMotion<S>& wanted, const S& switching) noexcept {
-  const S torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
-  switching_ = switching;
-  // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
-  const auto outside = torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0;
-  excess_ = rig::select(outside, torque_Nm, excess_);
-  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
-}
 
 }  // namespace abs_hil::control

@@ -10,7 +10,6 @@ namespace abs_hil::control {
 
 template <class S>
 BasicEquivalentControl<S>::BasicEquivalentControl(const ControllerContext& context)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(context.rig.wheels)},
       tyre_{context.rig.tyre},
       v_min_m_s_{context.options.v_min_m_s},
@@ -28,9 +27,7 @@ Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1) {
 }
 
 template <class S>
-BasicSlipErrorDynamics<S>::BasicSlipErrorDynamics(const ControllerContext& context)
-  requires std::is_same_v<S, double>
-    : equivalent_{context} {
+BasicSlipErrorDynamics<S>::BasicSlipErrorDynamics(const ControllerContext& context) : equivalent_{context} {
   const auto& gains = context.options.adaptive;
   rig::require_valid(gains, &AdaptiveOptions::ks0, "control.adaptive.");
   rig::require_valid(gains, &AdaptiveOptions::ks1, "control.adaptive.");

@@ -21,7 +21,6 @@ double at_least_one(double count) { return std::max(1.0, std::round(count)); }
 template <class S>
 BasicSlipPeakEstimator<S>::BasicSlipPeakEstimator(const SlipPeakOptions<>& options, double slip_min, double slip_max,
                                                   double rate_Hz)
-  requires std::is_same_v<S, double>
     : options_{options},
       log_force0_{rig::logarithm(options.peak_force0_N)},
       log_width0_{rig::logarithm(options.peak_slip0)},

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <type_traits>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/rig/scalar.hpp"
@@ -16,7 +15,6 @@ class SpeedTracker {
  public:
   SpeedTracker() = default;
   SpeedTracker(const ObserverOptions& options, std::int32_t counts_per_rev) noexcept
-    requires std::is_same_v<S, double>
       : bandwidth_rad_s_{options.bandwidth_rad_s},
         standstill_time_s_{options.standstill_time_s},
         rad_per_count_{rig::radians_per_count(counts_per_rev)} {}

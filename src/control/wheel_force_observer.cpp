@@ -64,7 +64,6 @@ double ramp_delay(const Matrix6& A, const Gain& gain, double dt) {
 template <class S>
 BasicWheelForceObserver<S>::BasicWheelForceObserver(const ForceObserverOptions<>& options,
                                                     const rig::RigParameters& rig, double rate_Hz)
-  requires std::is_same_v<S, double>
     : laws_{paper::laws(rig.wheels)} {
   if (!(options.force_rate_N2_s > 0.0 && options.brake_rate_Nm2_s > 0.0 && rate_Hz > 0.0)) {
     throw std::invalid_argument("the force observer's noise intensities and the control rate (Hz) must be > 0");

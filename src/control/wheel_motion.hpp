@@ -2,7 +2,6 @@
 #pragma once
 
 #include <numbers>
-#include <type_traits>
 
 #include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/control/slip_controller.hpp"
@@ -86,7 +85,6 @@ class BasicBrakeLag {
   BasicBrakeLag() = default;
   /// @param c31_per_s, period_s  > 0
   BasicBrakeLag(double c31_per_s, double period_s) noexcept
-    requires std::is_same_v<S, double>
       : covered_{-rig::exponential_less_one(-c31_per_s * period_s)} {}
 
   /// Static torque b to hold for one period so that the torque changes by `change_Nm`: it covers 1 - exp(-c31 h) of the
@@ -98,6 +96,5 @@ class BasicBrakeLag {
  private:
   S covered_{1.0};
 };
-using BrakeLag = BasicBrakeLag<double>;
 
 }  // namespace abs_hil::control

@@ -110,10 +110,4 @@ control::SlipOutput AgentController::step(const control::SlipInput& input) noexc
   return output;
 }
 
-control::ControllerFiles agent_controllers() noexcept {
-  return {".agent",
-          [](const std::string& file, const control::ControllerContext& context)
-              -> std::unique_ptr<control::SlipController> { return std::make_unique<AgentController>(file, context); }};
-}
-
 }  // namespace abs_hil::interchange

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "abs_hil/control/controller_context.hpp"
-#include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 
 namespace abs_hil::interchange {
@@ -29,10 +28,10 @@ struct AgentPage {
 };
 static_assert(sizeof(AgentPage) <= AgentPage::size && std::atomic<double>::is_always_lock_free);
 
-/// A slip controller whose torque an agent in another process chooses at its own pace, such as a learner. Each step it
-/// shows the agent what controllers get, and brakes with the agent's latest action: a share of the largest torque, in
-/// [0, 1]. It never waits. An action that is older than the page's hold_s, that is no number or lies outside [0, 1],
-/// brakes with 0. Real-time safe but for its construction.
+/// A slip controller from a file FILE.agent, whose torque an agent in another process chooses at its own pace, such as
+/// a learner. Each step it shows the agent what controllers get, and brakes with the agent's latest action: a share of
+/// the largest torque, in [0, 1]. It never waits. An action that is older than the page's hold_s, that is no number or
+/// lies outside [0, 1], brakes with 0. Real-time safe but for its construction.
 class AgentController final : public control::SlipController {
  public:
   enum Value : std::size_t {
@@ -77,8 +76,5 @@ class AgentController final : public control::SlipController {
       {{"agent_action", "action of the agent that acts, as a share of the largest torque"},
        {"agent_age_s", "time since the agent's latest action"}}};
 };
-
-/// Controllers from a file FILE.agent.
-[[nodiscard]] control::ControllerFiles agent_controllers() noexcept;
 
 }  // namespace abs_hil::interchange

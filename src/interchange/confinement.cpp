@@ -21,7 +21,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "interchange/host_protocol.hpp"
+#include "interchange/host.hpp"
 
 namespace abs_hil::interchange {
 

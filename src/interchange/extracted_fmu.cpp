@@ -1,5 +1,4 @@
 // Unpacks an FMU with checks of every name and size.
-#include "interchange/extracted_fmu.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -19,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
 
 namespace abs_hil::interchange {
@@ -43,10 +43,8 @@ constexpr std::array platform_folders{"binaries/linux64/", "binaries/x86_64-linu
 bool leads_out(std::string_view name) {
   if (name.empty() || name.front() == '/' || name.find('\\') != std::string_view::npos) return true;
   if (name.size() > 1 && name[1] == ':') return true;
-  for (const fs::path& part : fs::path(name)) {
-    if (part == "..") return true;
-  }
-  return false;
+  const fs::path path(name);
+  return std::ranges::find(path, "..") != path.end();
 }
 
 bool is_wanted(std::string_view name) {

@@ -3,6 +3,7 @@
 #include <fmi/fmi3FunctionTypes.h>
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdarg>
 #include <cstdlib>
 #include <cstring>
@@ -58,21 +59,25 @@ struct Called {
   static constexpr unsigned wants_the_end = 1000;
 };
 
+/// A function of the FMU that returns a status.
+template <class Type>
+class Function {
+ public:
+  Function(const LoadedLibrary& library, const char* name) : name_(name), function_(library.find<Type>(name)) {}
+  template <class... Arguments>
+  Called operator()(Arguments... arguments) const {
+    return {name_, static_cast<unsigned>(function_(arguments...))};
+  }
+
+ private:
+  const char* name_;
+  Type* function_;
+};
+
 /// The functions of one version that a controller needs.
 class Instance2 {
  public:
-  Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) {
-    library.find("fmi2Instantiate", instantiate_);
-    library.find("fmi2FreeInstance", free_);
-    library.find("fmi2SetupExperiment", set_up_);
-    library.find("fmi2EnterInitializationMode", enter_);
-    library.find("fmi2ExitInitializationMode", exit_);
-    library.find("fmi2Reset", reset_);
-    library.find("fmi2SetReal", set_);
-    library.find("fmi2GetReal", get_);
-    library.find("fmi2SetBoolean", set_flag_);
-    library.find("fmi2SetInteger", set_integer_);
-    library.find("fmi2DoStep", step_);
+  Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
     const std::string uri = "file://" + resources;
     instance_ = instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), uri.c_str(), &callbacks_, fmi2False,
                              fmi2False);
@@ -83,58 +88,41 @@ class Instance2 {
     if (instance_ != nullptr) free_(instance_);
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const {
-    return {"fmi2SetReal", set_(instance_, &r, 1, &value)};
-  }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const {
-    return {"fmi2GetReal", get_(instance_, &r, 1, &value)};
-  }
+  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value); }
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value); }
   [[nodiscard]] Called set_flag(std::uint32_t r, bool flag) const {
     const fmi2Boolean value = flag ? fmi2True : fmi2False;
-    return {"fmi2SetBoolean", set_flag_(instance_, &r, 1, &value)};
+    return set_flag_(instance_, &r, 1, &value);
   }
-  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
-    return {"fmi2SetInteger", set_integer_(instance_, &r, 1, &value)};
-  }
+  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const { return set_integer_(instance_, &r, 1, &value); }
   [[nodiscard]] Called enter() const {
-    const Called called{"fmi2SetupExperiment", set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0)};
-    return called.worked() ? Called{"fmi2EnterInitializationMode", enter_(instance_)} : called;
+    const Called called = set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0);
+    return called.worked() ? enter_(instance_) : called;
   }
-  [[nodiscard]] Called exit() const { return {"fmi2ExitInitializationMode", exit_(instance_)}; }
-  [[nodiscard]] Called reset() const { return {"fmi2Reset", reset_(instance_)}; }
-  [[nodiscard]] Called step(double time_s, double step_s) const {
-    return {"fmi2DoStep", step_(instance_, time_s, step_s, fmi2True)};
-  }
+  [[nodiscard]] Called exit() const { return exit_(instance_); }
+  [[nodiscard]] Called reset() const { return reset_(instance_); }
+  [[nodiscard]] Called step(double time_s, double step_s) const { return step_(instance_, time_s, step_s, fmi2True); }
 
  private:
+  const LoadedLibrary& library_;
   fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
-  fmi2InstantiateTYPE* instantiate_{nullptr};
-  fmi2FreeInstanceTYPE* free_{nullptr};
-  fmi2SetupExperimentTYPE* set_up_{nullptr};
-  fmi2EnterInitializationModeTYPE* enter_{nullptr};
-  fmi2ExitInitializationModeTYPE* exit_{nullptr};
-  fmi2ResetTYPE* reset_{nullptr};
-  fmi2SetRealTYPE* set_{nullptr};
-  fmi2GetRealTYPE* get_{nullptr};
-  fmi2SetBooleanTYPE* set_flag_{nullptr};
-  fmi2SetIntegerTYPE* set_integer_{nullptr};
-  fmi2DoStepTYPE* step_{nullptr};
+  fmi2InstantiateTYPE* instantiate_{library_.find<fmi2InstantiateTYPE>("fmi2Instantiate")};
+  fmi2FreeInstanceTYPE* free_{library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")};
+  Function<fmi2SetupExperimentTYPE> set_up_{library_, "fmi2SetupExperiment"};
+  Function<fmi2EnterInitializationModeTYPE> enter_{library_, "fmi2EnterInitializationMode"};
+  Function<fmi2ExitInitializationModeTYPE> exit_{library_, "fmi2ExitInitializationMode"};
+  Function<fmi2ResetTYPE> reset_{library_, "fmi2Reset"};
+  Function<fmi2SetRealTYPE> set_{library_, "fmi2SetReal"};
+  Function<fmi2GetRealTYPE> get_{library_, "fmi2GetReal"};
+  Function<fmi2SetBooleanTYPE> set_flag_{library_, "fmi2SetBoolean"};
+  Function<fmi2SetIntegerTYPE> set_integer_{library_, "fmi2SetInteger"};
+  Function<fmi2DoStepTYPE> step_{library_, "fmi2DoStep"};
   fmi2Component instance_{nullptr};
 };
 
 class Instance3 {
  public:
-  Instance3(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) {
-    library.find("fmi3InstantiateCoSimulation", instantiate_);
-    library.find("fmi3FreeInstance", free_);
-    library.find("fmi3EnterInitializationMode", enter_);
-    library.find("fmi3ExitInitializationMode", exit_);
-    library.find("fmi3Reset", reset_);
-    library.find("fmi3SetFloat64", set_);
-    library.find("fmi3GetFloat64", get_);
-    library.find("fmi3SetBoolean", set_flag_);
-    library.find("fmi3SetInt32", set_integer_);
-    library.find("fmi3DoStep", step_);
+  Instance3(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
     const std::string path = resources + "/";
     instance_ = instantiate_("controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False,
                              fmi3False, nullptr, 0, nullptr, log3, nullptr);
@@ -145,43 +133,37 @@ class Instance3 {
     if (instance_ != nullptr) free_(instance_);
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const {
-    return {"fmi3SetFloat64", set_(instance_, &r, 1, &value, 1)};
-  }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const {
-    return {"fmi3GetFloat64", get_(instance_, &r, 1, &value, 1)};
-  }
-  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const {
-    return {"fmi3SetBoolean", set_flag_(instance_, &r, 1, &value, 1)};
-  }
+  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value, 1); }
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value, 1); }
+  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const { return set_flag_(instance_, &r, 1, &value, 1); }
   [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
-    return {"fmi3SetInt32", set_integer_(instance_, &r, 1, &value, 1)};
+    return set_integer_(instance_, &r, 1, &value, 1);
   }
-  [[nodiscard]] Called enter() const {
-    return {"fmi3EnterInitializationMode", enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0)};
-  }
-  [[nodiscard]] Called exit() const { return {"fmi3ExitInitializationMode", exit_(instance_)}; }
-  [[nodiscard]] Called reset() const { return {"fmi3Reset", reset_(instance_)}; }
+  [[nodiscard]] Called enter() const { return enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0); }
+  [[nodiscard]] Called exit() const { return exit_(instance_); }
+  [[nodiscard]] Called reset() const { return reset_(instance_); }
   [[nodiscard]] Called step(double time_s, double step_s) const {
     fmi3Boolean event = fmi3False;
     fmi3Boolean terminate = fmi3False;
     fmi3Boolean early = fmi3False;
     fmi3Float64 last_s = 0.0;
-    const Called called{"fmi3DoStep", step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s)};
-    return called.worked() && terminate ? Called{"fmi3DoStep", Called::wants_the_end} : called;
+    const Called called = step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s);
+    return called.worked() && terminate ? Called{called.function, Called::wants_the_end} : called;
   }
 
  private:
-  fmi3InstantiateCoSimulationTYPE* instantiate_{nullptr};
-  fmi3FreeInstanceTYPE* free_{nullptr};
-  fmi3EnterInitializationModeTYPE* enter_{nullptr};
-  fmi3ExitInitializationModeTYPE* exit_{nullptr};
-  fmi3ResetTYPE* reset_{nullptr};
-  fmi3SetFloat64TYPE* set_{nullptr};
-  fmi3GetFloat64TYPE* get_{nullptr};
-  fmi3SetBooleanTYPE* set_flag_{nullptr};
-  fmi3SetInt32TYPE* set_integer_{nullptr};
-  fmi3DoStepTYPE* step_{nullptr};
+  const LoadedLibrary& library_;
+  fmi3InstantiateCoSimulationTYPE* instantiate_{
+      library_.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation")};
+  fmi3FreeInstanceTYPE* free_{library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")};
+  Function<fmi3EnterInitializationModeTYPE> enter_{library_, "fmi3EnterInitializationMode"};
+  Function<fmi3ExitInitializationModeTYPE> exit_{library_, "fmi3ExitInitializationMode"};
+  Function<fmi3ResetTYPE> reset_{library_, "fmi3Reset"};
+  Function<fmi3SetFloat64TYPE> set_{library_, "fmi3SetFloat64"};
+  Function<fmi3GetFloat64TYPE> get_{library_, "fmi3GetFloat64"};
+  Function<fmi3SetBooleanTYPE> set_flag_{library_, "fmi3SetBoolean"};
+  Function<fmi3SetInt32TYPE> set_integer_{library_, "fmi3SetInt32"};
+  Function<fmi3DoStepTYPE> step_{library_, "fmi3DoStep"};
   fmi3Instance instance_{nullptr};
 };
 

@@ -57,6 +57,13 @@ struct StepTimes {
   std::int64_t worst_ns{0};
 };
 
+/// What real-time code must not do, found in trial steps.
+struct Offences {
+  std::uint64_t allocations{0};
+  std::uint64_t system_calls{0};
+  std::int32_t first_system_call{-1};
+};
+
 /// The inputs of a braking from 170 rad/s, step by step, to try code without a rig. Wraps round.
 [[nodiscard]] abs_hil_input trial_input(std::int64_t step, double period_s) noexcept;
 /// Output whose fields are all NaN.

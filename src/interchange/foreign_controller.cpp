@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "interchange/agent_controller.hpp"
-#include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
 #include "runtime/clock.hpp"
 
@@ -149,17 +148,19 @@ ForeignTrial ForeignController::try_out() {
   return trial;
 }
 
-std::array<control::ControllerFiles, 3> foreign_controllers() noexcept {
-  const auto make = [](const std::string& file,
-                       const control::ControllerContext& context) -> std::unique_ptr<control::SlipController> {
+std::array<control::ControllerFiles, 4> foreign_controllers() noexcept {
+  using Made = std::unique_ptr<control::SlipController>;
+  const auto make = [](const std::string& file, const control::ControllerContext& context) -> Made {
     return std::make_unique<ForeignController>(file, context, chosen_home.load());
   };
-  return {{{".so", make}, {".fmu", make}, {rig::FileEndings::python_class, make}}};
+  const auto make_of_agent = [](const std::string& file, const control::ControllerContext& context) -> Made {
+    return std::make_unique<AgentController>(file, context);
+  };
+  return {{{".so", make}, {".fmu", make}, {rig::FileEndings::python_class, make}, {".agent", make_of_agent}}};
 }
 
 void register_foreign_controllers() {
   for (const control::ControllerFiles& files : foreign_controllers()) control::register_controller_files(files);
-  control::register_controller_files(agent_controllers());
 }
 
 void set_home(Home home) noexcept { chosen_home.store(home); }

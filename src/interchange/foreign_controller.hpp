@@ -8,9 +8,8 @@
 #include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
-#include "interchange/extracted_fmu.hpp"
+#include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
-#include "interchange/host_protocol.hpp"
 #include "runtime/cycle_statistics.hpp"
 
 namespace abs_hil::interchange {
@@ -63,10 +62,10 @@ class ForeignController final : public control::SlipController {
 [[nodiscard]] control::SlipInput slip_input(const abs_hil_input& foreign) noexcept;
 [[nodiscard]] abs_hil_output foreign_output(const control::SlipOutput& out) noexcept;
 
-/// What makes controllers from files (docs/interchange.md). Their code runs in a process of its own until `set_home`
-/// says otherwise.
-[[nodiscard]] std::array<control::ControllerFiles, 3> foreign_controllers() noexcept;
-/// Lets the registry make them, and those of agents.
+/// What makes controllers from files (docs/interchange.md), those of agents too. Code of files runs in a process of its
+/// own until `set_home` says otherwise.
+[[nodiscard]] std::array<control::ControllerFiles, 4> foreign_controllers() noexcept;
+/// Lets the registry make them.
 void register_foreign_controllers();
 void set_home(Home home) noexcept;
 

@@ -8,12 +8,9 @@
 #include <cmath>
 #include <csignal>
 #include <exception>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "interchange/confinement.hpp"
-#include "interchange/host_protocol.hpp"
-#include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {
 
@@ -46,14 +43,6 @@ Offences probe(ForeignCode& code, const HostRequest& request, const std::functio
   return found;
 }
 
-ForeignSetup setup_of(const nlohmann::json& json) {
-  return {.file = json.at("file").get<std::string>(),
-          .folder = json.at("folder").get<std::string>(),
-          .mapping = json.at("mapping").get<std::string>(),
-          .period_s = json.at("period_s").get<double>(),
-          .parameters = json.at("parameters").get<std::vector<std::pair<std::string, double>>>()};
-}
-
 }  // namespace
 
 int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup&)>& make,
@@ -69,24 +58,18 @@ int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup
     if (const std::string why = confine(host_socket); !why.empty()) {
       throw std::runtime_error("this kernel cannot confine a controller from a file (" + why + ")");
     }
-    code = make(setup_of(nlohmann::json::parse(packet)));
+    code = make(nlohmann::json::parse(packet).get<ForeignSetup>());
   } catch (const std::exception& error) {
     static_cast<void>(send_json({{"error", error.what()}}));
     return 2;
   }
   if (!send_json({{"signals", code->signals()}, {"source", code->source()}})) return 2;
-  runtime::MonotonicClock clock;
   HostRequest request;
   while (::recv(host_socket, &request, sizeof request, 0) == static_cast<ssize_t>(sizeof request)) {
     HostAnswer answer{.output = no_output()};
     switch (request.action) {
       case HostAction::reset: code->reset(request.input); break;
-      case HostAction::step: {
-        const std::int64_t before_ns = clock.now_ns();
-        code->step(request.input, answer.output);
-        answer.step_ns = clock.now_ns() - before_ns;
-        break;
-      }
+      case HostAction::step: code->step(request.input, answer.output); break;
       case HostAction::warm_up: answer.times = warm_up(*code, request.period_s, request.count); break;
       case HostAction::probe:
         answer.offences = probe(*code, request, allocations);

@@ -14,12 +14,12 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
 #include "abs_hil/rig/option.hpp"
+#include "driver/file_descriptor.hpp"
 #include "interchange/confinement.hpp"
 #include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
@@ -74,10 +74,6 @@ pid_t spawn(const std::string& program, int socket, int prints) {
   return pid;
 }
 
-}  // namespace
-
-namespace {
-
 /// Empty: the running program.
 std::filesystem::path& program_of_the_host() {
   static std::filesystem::path program;
@@ -104,55 +100,45 @@ std::string host_program(const std::filesystem::path& file) {
   return beside.string();
 }
 
-HostedCode::HostedCode(const ForeignSetup& setup) : period_s_(setup.period_s) {
+void HostedCode::start(const std::string& program) {
   std::array<int, 2> ends{-1, -1};
   std::array<int, 2> pipe{-1, -1};
-  const auto close_theirs = [&] {
-    if (ends[1] >= 0) ::close(std::exchange(ends[1], -1));
-    if (pipe[1] >= 0) ::close(std::exchange(pipe[1], -1));
-  };
-  try {
-    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-      throw std::runtime_error(std::string("socketpair: ") + std::strerror(errno));
-    }
-    socket_ = ends[0];
-    if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
-    prints_ = pipe[0];
-    ::fcntl(prints_, F_SETFL, O_NONBLOCK);
-    pid_ = spawn(host_program(setup.file), ends[1], pipe[1]);
-    close_theirs();
-    const bool in_python = rig::FileEndings::is_python_class(setup.file.native());
-    const std::string text = nlohmann::json{
-        {"file", in_python ? setup.file.string() : std::filesystem::absolute(setup.file).string()},
-        {"folder", setup.folder.string()},
-        {"mapping", setup.mapping.empty() ? std::string() : std::filesystem::absolute(setup.mapping).string()},
-        {"period_s", setup.period_s},
-        {"parameters",
-         setup.parameters}}.dump();
-    std::string answer(host_packet_max, '\0');
-    const bool sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
-    const ssize_t size = sent ? receive(answer.data(), answer.size(), start_limit_ms) : 0;
-    if (size <= static_cast<ssize_t>(sizeof(HostRefusal))) {
-      throw std::invalid_argument(fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(),
-                                              how_it_ended(size, answer.data())));
-    }
-    try {
-      const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
-      if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
-      signals_ = json.at("signals").get<std::vector<std::string>>();
-      source_ = json.at("source").get<std::string>();
-    } catch (const nlohmann::json::exception&) {
-      throw std::invalid_argument(
-          fmt::format("{}: while it was loaded and made, its code sent an answer of its own", setup.file.string()));
-    }
-  } catch (...) {
-    close_theirs();
-    end();
-    throw;
+  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    throw std::runtime_error(std::string("socketpair: ") + std::strerror(errno));
   }
+  socket_ = ends[0];
+  const driver::FileDescriptor their_socket(ends[1]);
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+  prints_ = pipe[0];
+  const driver::FileDescriptor their_prints(pipe[1]);
+  ::fcntl(prints_, F_SETFL, O_NONBLOCK);
+  pid_ = spawn(program, their_socket.get(), their_prints.get());
 }
 
-HostedCode::~HostedCode() { end(); }
+// A constructor that ends by an exception after the other one has returned calls the destructor.
+HostedCode::HostedCode(const ForeignSetup& setup) : HostedCode(setup.period_s) {
+  start(host_program(setup.file));
+  ForeignSetup told = setup;
+  if (!rig::FileEndings::is_python_class(setup.file.native())) told.file = std::filesystem::absolute(setup.file);
+  if (!setup.mapping.empty()) told.mapping = std::filesystem::absolute(setup.mapping);
+  const std::string text = nlohmann::json(told).dump();
+  std::string answer(host_packet_max, '\0');
+  const bool sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+  const ssize_t size = sent ? receive(answer.data(), answer.size(), start_limit_ms) : 0;
+  if (size <= static_cast<ssize_t>(sizeof(HostRefusal))) {
+    throw std::invalid_argument(fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(),
+                                            how_it_ended(size, answer.data())));
+  }
+  try {
+    const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
+    if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
+    json.at("signals").get_to(signals_);
+    json.at("source").get_to(source_);
+  } catch (const nlohmann::json::exception&) {
+    throw std::invalid_argument(
+        fmt::format("{}: while it was loaded and made, its code sent an answer of its own", setup.file.string()));
+  }
+}
 
 void HostedCode::end() noexcept {
   if (pid_ != 0) {
@@ -274,7 +260,6 @@ void HostedCode::step(const abs_hil_input& input, abs_hil_output& output) noexce
   runtime::MonotonicClock clock;
   const std::int64_t before_ns = clock.now_ns();
   output = ask({.action = HostAction::step, .input = input}, answer) ? answer.output : no_output();
-  step_ns_ = answer.step_ns;
   spent_ns_ += clock.now_ns() - before_ns;
   ++all_steps_;
   const double simulated_ns = static_cast<double>(all_steps_) * period_s_ * 1e9;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "interchange/foreign_code.hpp"
-#include "interchange/host_protocol.hpp"
+#include "interchange/host.hpp"
 
 namespace abs_hil::interchange {
 
@@ -22,19 +22,20 @@ class HostedCode final : public ForeignCode {
   HostedCode(const HostedCode&) = delete;
   HostedCode& operator=(const HostedCode&) = delete;
   /// Ends the process.
-  ~HostedCode() override;
+  ~HostedCode() override { end(); }
 
   void reset(const abs_hil_input& input) noexcept override;
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override;
   [[nodiscard]] std::string failure() const override { return failure_; }
-  /// Duration of the last step within the other process.
-  [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
 
   [[nodiscard]] StepTimes warm_up_there(double period_s, std::uint32_t steps);
   /// Ends the process as well.
   [[nodiscard]] Offences probe(double period_s, std::uint32_t steps);
 
  private:
+  explicit HostedCode(double period_s) : period_s_(period_s) {}
+
+  void start(const std::string& program);
   /// Waits for a packet and passes on what the code prints. Bytes of the packet; 0: the other end is closed; < 0: none
   /// came in time.
   [[nodiscard]] ssize_t receive(void* data, std::size_t size, int limit_ms) noexcept;
@@ -54,7 +55,6 @@ class HostedCode final : public ForeignCode {
   std::uint64_t steps_{0};      ///< since the last reset
   std::uint64_t all_steps_{0};  ///< of the run
   std::int64_t spent_ns_{0};    ///< waiting for them
-  std::int64_t step_ns_{0};
   std::string failure_{};
 };
 

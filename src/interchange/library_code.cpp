@@ -22,10 +22,10 @@ void check_size(const std::filesystem::path& file, const char* what, std::uint32
                            its, ours, header_name));
 }
 
-/// Version and sizes that the library states for itself.
-void check_interface(const std::filesystem::path& file, const LoadedLibrary& library) {
-  const abs_hil_controller_interface_t* its = nullptr;
-  library.find(interface_name, its);
+/// The library, if version and sizes that it states for itself are those of this program.
+LoadedLibrary loaded(const std::filesystem::path& file) {
+  LoadedLibrary library(file, file);
+  const auto* const its = library.find<const abs_hil_controller_interface_t>(interface_name);
   if (its->magic != ABS_HIL_CONTROLLER_MAGIC) {
     refuse(file, fmt::format("its {} does not begin as it should; build it with {}", interface_name, header_name));
   }
@@ -37,17 +37,12 @@ void check_interface(const std::filesystem::path& file, const LoadedLibrary& lib
   check_size(file, "abs_hil_setup", its->setup_size, sizeof(abs_hil_setup));
   check_size(file, "abs_hil_input", its->input_size, sizeof(abs_hil_input));
   check_size(file, "abs_hil_output", its->output_size, sizeof(abs_hil_output));
+  return library;
 }
 
 class LibraryCode final : public ForeignCode {
  public:
-  explicit LibraryCode(const ForeignSetup& setup) : library_(setup.file, setup.file) {
-    check_interface(setup.file, library_);
-    library_.find(create_name, create_);
-    library_.find("abs_hil_controller_reset", reset_);
-    library_.find("abs_hil_controller_step", step_);
-    library_.find("abs_hil_controller_signal", signal_);
-    library_.find("abs_hil_controller_destroy", destroy_);
+  explicit LibraryCode(const ForeignSetup& setup) : library_(loaded(setup.file)) {
     make(setup);
     for (std::uint32_t n = 0; const char* name = signal_(controller_, n); ++n) {
       if (n == ABS_HIL_CONTROLLER_SIGNALS) {
@@ -82,11 +77,14 @@ class LibraryCode final : public ForeignCode {
   }
 
   LoadedLibrary library_;
-  decltype(abs_hil_controller_create)* create_{nullptr};
-  decltype(abs_hil_controller_reset)* reset_{nullptr};
-  decltype(abs_hil_controller_step)* step_{nullptr};
-  decltype(abs_hil_controller_signal)* signal_{nullptr};
-  decltype(abs_hil_controller_destroy)* destroy_{nullptr};
+  decltype(abs_hil_controller_create)* create_{library_.find<decltype(abs_hil_controller_create)>(create_name)};
+  decltype(abs_hil_controller_reset)* reset_{
+      library_.find<decltype(abs_hil_controller_reset)>("abs_hil_controller_reset")};
+  decltype(abs_hil_controller_step)* step_{library_.find<decltype(abs_hil_controller_step)>("abs_hil_controller_step")};
+  decltype(abs_hil_controller_signal)* signal_{
+      library_.find<decltype(abs_hil_controller_signal)>("abs_hil_controller_signal")};
+  decltype(abs_hil_controller_destroy)* destroy_{
+      library_.find<decltype(abs_hil_controller_destroy)>("abs_hil_controller_destroy")};
   void* controller_{nullptr};
 };
 

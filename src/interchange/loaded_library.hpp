@@ -25,9 +25,10 @@ class LoadedLibrary {
   }
   /// The function or object of that name. Throws std::invalid_argument if there is none.
   template <class Symbol>
-  void find(const char* name, Symbol*& symbol) const {
-    symbol = reinterpret_cast<Symbol*>(::dlsym(handle_.get(), name));
+  [[nodiscard]] Symbol* find(const char* name) const {
+    auto* const symbol = reinterpret_cast<Symbol*>(::dlsym(handle_.get(), name));
     if (symbol == nullptr) refuse(file_, std::string("it does not define ") + name);
+    return symbol;
   }
 
  private:

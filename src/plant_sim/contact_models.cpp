@@ -9,13 +9,16 @@
 namespace abs_hil::plant_sim {
 namespace {
 
+/// Friction must leave at least this share of the lever's arm L sin phi; below it the normal force would increase more
+/// than tenfold.
+constexpr double least_arm = 0.1;
+
 constexpr double square(double x) noexcept { return x * x; }
 
 }  // namespace
 
 template <class S>
 BasicIntecoMu<S>::BasicIntecoMu(const PlantOptions& options)
-  requires std::is_same_v<S, double>
     : w1_(options.inteco_mu.w1),
       w2_(options.inteco_mu.w2),
       w3_(options.inteco_mu.w3),
@@ -35,9 +38,7 @@ BasicIntecoMu<S>::BasicIntecoMu(const PlantOptions& options)
 
 /// The maximum of the curve on [0, 1]. It may lie at an end: the published curve is highest at 1.
 template <class S>
-double BasicIntecoMu<S>::highest() const noexcept
-  requires std::is_same_v<S, double>
-{
+double BasicIntecoMu<S>::highest() const noexcept {
   // Sample more densely at small slips, where the knee is; then run a golden-section search around the best sample.
   constexpr int samples = 200;
   const auto sample = [](int i) { return square(static_cast<double>(i) / samples); };
@@ -60,9 +61,7 @@ double BasicIntecoMu<S>::highest() const noexcept
 /// Upper bound on |mu'| over [0, 1]. The saturating term is steepest at its turning point, s^p = a (p - 1) / (p + 1);
 /// the polynomial's slope is bounded term by term.
 template <class S>
-double BasicIntecoMu<S>::slope_bound() const noexcept
-  requires std::is_same_v<S, double>
-{
+double BasicIntecoMu<S>::slope_bound() const noexcept {
   const double power = a_ * (p_ - 1.0) / (p_ + 1.0);
   const double s = std::pow(power, 1.0 / p_);
   const double saturating = std::abs(w4_) * a_ * p_ * std::pow(s, p_ - 1.0) / square(a_ + power);
@@ -77,17 +76,8 @@ TyreModel make_tyre_model(const PlantOptions& options) {
   throw std::invalid_argument("plant.tyre = \"" + options.tyre + "\": give magic-formula or inteco-mu");
 }
 
-namespace {
-
-/// Friction must leave at least this share of the lever's arm L sin phi; below it the normal force would increase more
-/// than tenfold.
-constexpr double least_arm = 0.1;
-
-}  // namespace
-
 template <class S>
 BasicLeverLoad<S>::BasicLeverLoad(const PlantOptions& options, double peak_mu, double friction_at_most)
-  requires std::is_same_v<S, double>
     : peak_mu_(peak_mu),
       r1_m_(options.rig.wheels.r1_m),
       Mg_Nm_(options.lever.Mg_Nm),

@@ -11,11 +11,6 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// The lowest 32 bits of the two's complement, as the register keeps them.
-std::int32_t in_register(std::int64_t counts) noexcept {
-  return std::bit_cast<std::int32_t>(static_cast<std::uint32_t>(counts));
-}
-
 /// Quotient rounded down, for a divisor > 0.
 std::int64_t whole_turns(std::int64_t edges, std::int64_t counts_per_rev) noexcept {
   return edges / counts_per_rev - (edges % counts_per_rev < 0 ? 1 : 0);
@@ -28,10 +23,6 @@ rig::EccentricityParameters beside(double both_rad, rig::EccentricityParameters 
 }
 
 }  // namespace
-
-std::int32_t encoder_counts(double angle_rad, std::int32_t counts_per_rev) noexcept {
-  return in_register(static_cast<std::int64_t>(std::floor(angle_rad / rig::radians_per_count(counts_per_rev))));
-}
 
 Encoder::Encoder(std::int32_t counts_per_rev, const rig::EccentricityParameters& eccentricity,
                  const EncoderFlaws& flaws) noexcept
@@ -71,7 +62,8 @@ std::int64_t Encoder::without_lost(std::int64_t edge) const noexcept {
 }
 
 std::int32_t Encoder::counts(double angle_rad, double offset_rad) const noexcept {
-  return in_register(position(angle_rad, offset_rad));
+  // The register keeps the lowest 32 bits of the two's complement.
+  return std::bit_cast<std::int32_t>(static_cast<std::uint32_t>(position(angle_rad, offset_rad)));
 }
 
 Encoder upper_encoder(const PlantOptions& plant) noexcept {

@@ -14,6 +14,8 @@ namespace abs_hil::plant_sim {
 namespace {
 
 constexpr double highest_factor = 10.0;
+/// Rounding error of the sum of a run's intervals; a piece with less time left has ended.
+constexpr double time_rounding_s = 1e-11;
 
 [[noreturn]] void refuse(std::string_view part, const std::string& problem) {
   throw std::invalid_argument("\"" + std::string(part) + "\" " + problem);
@@ -72,15 +74,9 @@ Change change(std::string_view part) {
 
 }  // namespace
 
-FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes axes) : pieces_{{}} {
-  try {
-    read(text, axes);
-  } catch (const std::invalid_argument& problem) {
-    throw std::invalid_argument(std::string(key) + ": " + problem.what());
-  }
-}
-
-void FactorProfile::read(std::string_view text, Axes axes) {
+FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes axes) try : pieces_{{}
+}  // namespace abs_hil::plant_sim
+{
   if (rig::trimmed(text).empty()) return;
   const bool time_only = axes == Axes::time_only;
   const std::string_view whole = rig::trimmed(text);
@@ -120,19 +116,15 @@ void FactorProfile::read(std::string_view text, Axes axes) {
     pieces_.push_back({.begin = next.end, .value = next.value});
   }
 }
+catch (const std::invalid_argument& problem) {
+  throw std::invalid_argument(std::string(key) + ": " + problem.what());
+}
 
 double FactorProfile::highest() const noexcept {
   double highest = 0.0;
   for (const Piece& piece : pieces_) highest = std::max(highest, piece.highest());
   return highest;
 }
-
-namespace {
-
-/// Rounding error of the sum of a run's intervals; a piece with less time left has ended.
-constexpr double time_rounding_s = 1e-11;
-
-}  // namespace
 
 void FactorProgress::start(double angle2_rad) noexcept {
   index_ = 0;

@@ -29,41 +29,6 @@ double direction(double speed_rad_s, double pull_Nm, double hold_Nm) noexcept {
   return std::abs(pull_Nm) <= hold_Nm ? 0.0 : sign_of(pull_Nm);
 }
 
-}  // namespace
-
-Sliding sliding_from(TorqueBalance balance, const StateVector& x) noexcept {
-  // Assume first that a standing upper wheel is held. If its friction cannot hold it then, it cannot hold it with the
-  // force of the sliding wheel either, which differs for a load that depends on the brake.
-  balance.sliding = {sign_of(x[omega1]), sign_of(x[omega2])};
-  if (x[omega1] != 0.0 && x[omega2] != 0.0) return balance.sliding;
-  const WheelModel& model = balance.model;
-  const double force_N = balance.tyre_force_N(x, 0.0);
-  return {direction(x[omega1], pull_on_upper_Nm(model, force_N), hold_of_upper_Nm(model, x)),
-          direction(x[omega2], pull_on_lower_Nm(model, balance.held, force_N), model.wheels().M20_Nm)};
-}
-
-double margin(const TorqueBalance& balance, const StateVector& x, double time_s) noexcept {
-  const WheelModel& model = balance.model;
-  const Sliding& sliding = balance.sliding;
-  const double to_roll_rad = balance.friction.end_angle2_rad - x[angle2];
-  if (sliding.upper != 0.0 && sliding.lower != 0.0) {
-    return std::min({sliding.upper * x[omega1], sliding.lower * x[omega2], to_roll_rad});
-  }
-  const double force_N = balance.tyre_force_N(x, time_s);
-  const double upper = sliding.upper != 0.0 ? sliding.upper * x[omega1]
-                                            : hold_of_upper_Nm(model, x) - std::abs(pull_on_upper_Nm(model, force_N));
-  const double lower = sliding.lower != 0.0
-                           ? sliding.lower * x[omega2]
-                           : model.wheels().M20_Nm - std::abs(pull_on_lower_Nm(model, balance.held, force_N));
-  return std::min({upper, lower, to_roll_rad});
-}
-
-bool stands_for_good(const WheelModel& model, const HeldTorques& held, const StateVector& x) noexcept {
-  return x[omega1] == 0.0 && x[omega2] == 0.0 && std::abs(pull_on_lower_Nm(model, held, 0.0)) <= model.wheels().M20_Nm;
-}
-
-namespace {
-
 /// If a wheel breaks away and is held again within this time, the torque on it equalled its friction within rounding.
 constexpr double least_slide_s = 1e-6;
 /// Bisections of the interval that contains a stop or break-away: down to 10^-12 of the substep.
@@ -195,6 +160,37 @@ double slide(const WheelModel& model, double max_step_s, const HeldTorques& held
 }
 
 }  // namespace
+
+Sliding sliding_from(TorqueBalance balance, const StateVector& x) noexcept {
+  // Assume first that a standing upper wheel is held. If its friction cannot hold it then, it cannot hold it with the
+  // force of the sliding wheel either, which differs for a load that depends on the brake.
+  balance.sliding = {sign_of(x[omega1]), sign_of(x[omega2])};
+  if (x[omega1] != 0.0 && x[omega2] != 0.0) return balance.sliding;
+  const WheelModel& model = balance.model;
+  const double force_N = balance.tyre_force_N(x, 0.0);
+  return {direction(x[omega1], pull_on_upper_Nm(model, force_N), hold_of_upper_Nm(model, x)),
+          direction(x[omega2], pull_on_lower_Nm(model, balance.held, force_N), model.wheels().M20_Nm)};
+}
+
+double margin(const TorqueBalance& balance, const StateVector& x, double time_s) noexcept {
+  const WheelModel& model = balance.model;
+  const Sliding& sliding = balance.sliding;
+  const double to_roll_rad = balance.friction.end_angle2_rad - x[angle2];
+  if (sliding.upper != 0.0 && sliding.lower != 0.0) {
+    return std::min({sliding.upper * x[omega1], sliding.lower * x[omega2], to_roll_rad});
+  }
+  const double force_N = balance.tyre_force_N(x, time_s);
+  const double upper = sliding.upper != 0.0 ? sliding.upper * x[omega1]
+                                            : hold_of_upper_Nm(model, x) - std::abs(pull_on_upper_Nm(model, force_N));
+  const double lower = sliding.lower != 0.0
+                           ? sliding.lower * x[omega2]
+                           : model.wheels().M20_Nm - std::abs(pull_on_lower_Nm(model, balance.held, force_N));
+  return std::min({upper, lower, to_roll_rad});
+}
+
+bool stands_for_good(const WheelModel& model, const HeldTorques& held, const StateVector& x) noexcept {
+  return x[omega1] == 0.0 && x[omega2] == 0.0 && std::abs(pull_on_lower_Nm(model, held, 0.0)) <= model.wheels().M20_Nm;
+}
 
 void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
                FactorProgress& profile, StateVector& x) noexcept {

@@ -135,19 +135,12 @@ std::uint64_t RunOutputs::csv_rows_lost() const {
 
 telemetry::StatusSnapshot RunOutputs::snapshot() const {
   const runtime::CycleStatistics& statistics = run_.executive().statistics();
-  const rig::TimingSummary timing = statistics.summary();
   return {.cycles = statistics.cycles(),
-          .overruns = timing.overruns.total,
           .telemetry_drops = run_.record_drops(),
           .gate_interventions = rig::interventions(run_.gate().counts()),
           .checks_unjudged = run_.gate().unjudged_share(),
           .realtime = run_.realtime_report().realtime(),
-          .wakeup_latency = timing.wakeup_latency,
-          .cycle_time = timing.cycle_time,
-          .read = timing.read,
-          .control = timing.control,
-          .write = timing.write,
-          .late = timing.overruns};
+          .timing = statistics.summary()};
 }
 
 std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,

@@ -30,6 +30,23 @@ template <typename... Values>
   return text.substr(0, text.find_last_not_of(blanks) + 1);
 }
 
+/// The parts between the separators, at least one.
+[[nodiscard]] inline std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin <= text.size(); begin += parts.back().size() + 1) {
+    parts.push_back(text.substr(begin, text.find(separator, begin) - begin));
+  }
+  return parts;
+}
+
+/// A field of CSV (RFC 4180), in quotes if it needs them.
+[[nodiscard]] inline std::string csv_field(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string quoted = "\"";
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
+}
+
 /// The words with commas between them.
 [[nodiscard]] inline std::string joined(const std::vector<std::string>& words) {
   std::string text;

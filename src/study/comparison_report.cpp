@@ -8,8 +8,8 @@
 #include "analysis/json_number.hpp"
 #include "config/key_table.hpp"
 #include "config/model.hpp"
+#include "rig/formatted_text.hpp"
 #include "study/comparison.hpp"
-#include "study/compute.hpp"
 
 namespace abs_hil::study {
 
@@ -217,7 +217,7 @@ std::string to_csv(const ComparisonTable& table) {
       const Estimate d = column.differences.empty() ? Estimate{.mean = unknown, .low = unknown, .high = unknown}
                                                     : column.differences[m];
       const Spread& s = column.spreads[m];
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(name_of(table, c)),
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", rig::csv_field(name_of(table, c)),
                           compared_metrics()[m].name, e.n, e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low,
                           d.high, s.p10, s.median, s.p90);
     }
@@ -276,7 +276,8 @@ std::string runs_csv(const Study& study, const RunsByController& runs) {
   for (std::size_t c = 0; c < runs.size(); ++c) {
     for (std::size_t k = 0; k < runs[c].size(); ++k) {
       const RunResult& run = runs[c][k];
-      text += fmt::format("{},{},{}", csv_field(study.contenders(0)[c].name), k, run.stopped() ? "completed" : "fault");
+      text += fmt::format("{},{},{}", rig::csv_field(study.contenders(0)[c].name), k,
+                          run.stopped() ? "completed" : "fault");
       for (const analysis::Figure& metric : compared_metrics()) text += fmt::format(",{}", metric.of(run.metrics));
       const Perturbation perturbation = draw(repeat.variation, repeat.seed, k);
       drawn.plant = perturbed(nominal.plant, perturbation);

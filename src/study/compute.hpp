@@ -19,9 +19,6 @@ namespace abs_hil::study {
 [[nodiscard]] std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome,
                                      const std::vector<double>& own = {});
 
-/// A field of CSV, in quotes if it needs them.
-[[nodiscard]] std::string csv_field(const std::string& text);
-
 /// One of several shares of a study's chunks: every `of`-th one.
 struct Shard {
   std::uint64_t number{1};  ///< from 1

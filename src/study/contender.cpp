@@ -62,10 +62,7 @@ bool read_file(Contender& contender, config::KeyTable& keys, const std::string& 
 /// Reads what stands between the braces: KEY=VALUE and files, with commas between them.
 void read_changes(Contender& contender, std::string_view changes, const std::string& entry) {
   config::KeyTable keys(contender.settings);
-  for (std::size_t begin = 0; begin <= changes.size();) {
-    const std::size_t end = std::min(changes.find(',', begin), changes.size());
-    const std::string_view change = changes.substr(begin, end - begin);
-    begin = end + 1;
+  for (const std::string_view change : rig::split(changes, ',')) {
     const std::size_t equals = change.find('=');
     if (equals == std::string_view::npos && change.ends_with(file_ending)) {
       read_file(contender, keys, std::string(change), entry, false);

@@ -36,6 +36,32 @@ bool equal(const rig::OptionTarget& a, const rig::OptionTarget& b) {
   return std::visit([&b](auto* value) { return *value == *std::get<decltype(value)>(b); }, a);
 }
 
+/// Makes the jobs of neighbouring runs, and keeps their settings, which a job only points to. Runs that differ in their
+/// varied plant alone share them, since what a batch prepares from settings costs more than a copy.
+class Jobs {
+ public:
+  explicit Jobs(const Study& study) : study_(study), run_(study), latest_(study.contenders(0).size()) {}
+
+  Job job_of(std::uint64_t run) {
+    const RunIndex index = study_.index_of(run);
+    const config::Settings* settings = &study_.contenders(index.study_case)[index.contender].settings;
+    if (!study_.shares_settings()) {
+      auto& [at, own] = latest_[index.contender];
+      if (own == nullptr || !at.same_settings(index)) own = &settings_.emplace_back(run_.of(index));
+      at = index;
+      settings = own;
+    }
+    RunSettings::Drawn drawn = run_.drawn(index);
+    return {.settings = settings, .plant = std::move(drawn.plant), .seed = drawn.seed};
+  }
+
+ private:
+  const Study& study_;
+  RunSettings run_;
+  std::deque<config::Settings> settings_{};
+  std::vector<std::pair<RunIndex, const config::Settings*>> latest_;  ///< by controller
+};
+
 }  // namespace
 
 RunSettings::RunSettings(const Study& study)
@@ -98,36 +124,6 @@ config::Settings settings_of_run(const Study& study, std::uint64_t number) {
   }
   return RunSettings(study).whole(study.index_of(number));
 }
-
-namespace {
-
-/// Makes the jobs of neighbouring runs, and keeps their settings, which a job only points to. Runs that differ in their
-/// varied plant alone share them, since what a batch prepares from settings costs more than a copy.
-class Jobs {
- public:
-  explicit Jobs(const Study& study) : study_(study), run_(study), latest_(study.contenders(0).size()) {}
-
-  Job job_of(std::uint64_t run) {
-    const RunIndex index = study_.index_of(run);
-    const config::Settings* settings = &study_.contenders(index.study_case)[index.contender].settings;
-    if (!study_.shares_settings()) {
-      auto& [at, own] = latest_[index.contender];
-      if (own == nullptr || !at.same_settings(index)) own = &settings_.emplace_back(run_.of(index));
-      at = index;
-      settings = own;
-    }
-    RunSettings::Drawn drawn = run_.drawn(index);
-    return {.settings = settings, .plant = std::move(drawn.plant), .seed = drawn.seed};
-  }
-
- private:
-  const Study& study_;
-  RunSettings run_;
-  std::deque<config::Settings> settings_{};
-  std::vector<std::pair<RunIndex, const config::Settings*>> latest_;  ///< by controller
-};
-
-}  // namespace
 
 void run_part(const Study& study, std::size_t count, std::size_t threads,
               const std::function<std::uint64_t(std::size_t)>& run_of,

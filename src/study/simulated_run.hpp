@@ -20,7 +20,15 @@ struct RunResult {
 /// @param plant  the true parameters of the rig
 /// @param seed  seed of the simulator: the encoders' initial position within a count
 /// Throws std::invalid_argument for unusable options.
-[[nodiscard]] RunResult simulate(const run::Prepared& prepared, const plant_sim::PlantOptions& plant,
-                                 std::uint64_t seed);
+[[nodiscard]] inline RunResult simulate(const run::Prepared& prepared, const plant_sim::PlantOptions& plant,
+                                        std::uint64_t seed) {
+  run::Run run(prepared, {.stepped = true, .plant = &plant, .sensor_seed = seed});
+  run.begin();
+  while (run.cycle() && !run.metrics().complete()) {
+  }
+  // The last cycle of a complete sequence has a reason that is not a fault; an early end has a limit or fault.
+  const rig::Reason end = run.end_reason();
+  return {.metrics = run.metrics().metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
+}
 
 }  // namespace abs_hil::study

@@ -63,10 +63,10 @@ Study::Study(StudyScript script, std::vector<StudyCase> cases)
   if (script_.repeat.runs < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
   double runs = static_cast<double>(cases_.size()) * static_cast<double>(script_.repeat.runs) *
                 static_cast<double>(script_.controllers.size()) * static_cast<double>(design_.rows());
+  std::size_t ranges = 0;
   for (const Factor& factor : script_.factors) {
-    range_of_factor_.push_back(static_cast<std::size_t>(std::ranges::count_if(
-        script_.factors.begin(), script_.factors.begin() + static_cast<std::ptrdiff_t>(range_of_factor_.size()),
-        &Factor::has_range)));
+    range_of_factor_.push_back(ranges);
+    if (factor.has_range()) ++ranges;
     if (const auto* levels = std::get_if<Levels>(&factor.values)) {
       level_combinations_ *= levels->values.size();
       runs *= static_cast<double>(levels->values.size());
@@ -129,11 +129,6 @@ bool Study::can_share_settings() const {
   return numbers_of_plant && std::ranges::none_of(cases_, [](const StudyCase& one) {
            return config::find(one.settings.experiment.name)->text.find("plant.") != std::string::npos;
          });
-}
-
-std::uint64_t Study::runs_in(std::uint64_t chunk) const noexcept {
-  const std::uint64_t first = chunk * script_.chunk;
-  return std::min(script_.chunk, runs_ - first);
 }
 
 RunIndex Study::index_of(std::uint64_t run) const noexcept {

@@ -53,10 +53,6 @@ class Study {
   }
   [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
   [[nodiscard]] std::uint64_t points() const noexcept { return design_.rows(); }
-  /// Number of files of results.
-  [[nodiscard]] std::uint64_t chunks() const noexcept { return (runs_ + script_.chunk - 1) / script_.chunk; }
-  /// Number of runs in a chunk; the last one may have fewer.
-  [[nodiscard]] std::uint64_t runs_in(std::uint64_t chunk) const noexcept;
 
   /// @param run  < runs()
   [[nodiscard]] RunIndex index_of(std::uint64_t run) const noexcept;

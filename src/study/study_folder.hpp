@@ -36,7 +36,9 @@ struct StudyFacts {
   std::vector<std::string> metrics{};  ///< of every run, then the study's own
   std::string configurations{};        ///< effective configuration of each case, as JSON
 
+  /// Number of files of results.
   [[nodiscard]] std::uint64_t chunks() const noexcept { return (runs + chunk - 1) / chunk; }
+  /// Number of runs in a chunk; the last one may have fewer.
   [[nodiscard]] std::uint64_t runs_in(std::uint64_t number) const noexcept {
     return std::min(chunk, runs - number * chunk);
   }

@@ -4,10 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <random>
+#include <span>
 #include <stdexcept>
+
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::study {
 
@@ -19,6 +23,17 @@ constexpr double largest_C = 2.0;    ///< above this the tyre force would change
 constexpr double largest_u0 = 0.99;  ///< the dead zone must leave some duty for braking
 /// Seed of the sensors if the phase does not vary.
 constexpr std::uint64_t fixed_sensor_seed = 1;
+
+/// A magnitude of its own; the first three are also called parameters.
+struct Magnitude {
+  std::string_view name;
+  double Variation::*value;
+};
+constexpr std::array<Magnitude, 5> magnitudes{{{"wheels", &Variation::wheels},
+                                               {"brake", &Variation::brake},
+                                               {"tyre", &Variation::tyre},
+                                               {"theta", &Variation::theta},
+                                               {"radii", &Variation::radii}}};
 
 double parse_magnitude(std::string_view entry, std::string_view text) {
   double value = 0.0;
@@ -38,25 +53,30 @@ void parse_entry(std::string_view entry, Variation& v) {
   }
   const std::size_t equals = entry.find('=');
   const std::string_view name = entry.substr(0, equals);
-  const auto magnitude = [&] {
-    return parse_magnitude(entry, equals == entry.npos ? std::string_view() : entry.substr(equals + 1));
-  };
-  if (name == "parameters") {
-    v.wheels = v.brake = v.tyre = magnitude();
-  } else if (name == "wheels") {
-    v.wheels = magnitude();
-  } else if (name == "brake") {
-    v.brake = magnitude();
-  } else if (name == "tyre") {
-    v.tyre = magnitude();
-  } else if (name == "theta") {
-    v.theta = magnitude();
-  } else if (name == "radii") {
-    v.radii = magnitude();
-  } else {
+  const bool all_parameters = name == "parameters";
+  const auto* const named = std::ranges::find(magnitudes, name, &Magnitude::name);
+  if (!all_parameters && named == magnitudes.end()) {
     throw std::invalid_argument(fmt::format(
         "--vary: \"{}\" is unknown; give parameters, wheels, brake, tyre, theta, radii, phase or none", entry));
   }
+  const double magnitude = parse_magnitude(entry, equals == entry.npos ? std::string_view() : entry.substr(equals + 1));
+  if (all_parameters) {
+    v.wheels = v.brake = v.tyre = magnitude;
+  } else {
+    v.*named->value = magnitude;
+  }
+}
+
+/// A factor for each parameter, by the magnitude of its variation; the seed stays.
+template <class Factor>
+Perturbation perturbation_of(const Variation& v, const Factor& factor) {
+  Perturbation p;
+  for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel = factor(v.wheels);
+  for (double* brake : {&p.brake_gain, &p.u0, &p.c31}) *brake = factor(v.brake);
+  for (double* tyre : {&p.B, &p.C}) *tyre = factor(v.tyre);
+  p.theta = factor(v.theta);
+  for (double* radius : {&p.r1, &p.r2}) *radius = factor(v.radii);
+  return p;
 }
 
 /// Uniform in [-1, 1) from the generator's upper 53 bits: the same with every standard library.
@@ -75,11 +95,7 @@ Variation Variation::standard() noexcept {
 Variation Variation::parse(std::string_view text) {
   Variation result;
   if (text == "none") return result;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    parse_entry(text.substr(begin, end - begin), result);
-    begin = end + 1;
-  }
+  for (const std::string_view entry : rig::split(text, ',')) parse_entry(entry, result);
   return result;
 }
 
@@ -89,15 +105,11 @@ std::string Variation::text() const {
   const auto add_magnitude = [&add](std::string_view name, double magnitude) {
     if (magnitude > 0.0) add(fmt::format("{}={}", name, magnitude));
   };
-  if (wheels == brake && brake == tyre) {
-    add_magnitude("parameters", wheels);
-  } else {
-    add_magnitude("wheels", wheels);
-    add_magnitude("brake", brake);
-    add_magnitude("tyre", tyre);
+  const bool alike = wheels == brake && brake == tyre;
+  if (alike) add_magnitude("parameters", wheels);
+  for (const Magnitude& magnitude : std::span(magnitudes).subspan(alike ? 3 : 0)) {
+    add_magnitude(magnitude.name, this->*magnitude.value);
   }
-  add_magnitude("theta", theta);
-  add_magnitude("radii", radii);
   if (phase) add("phase");
   return text.empty() ? "none" : text;
 }
@@ -107,26 +119,15 @@ Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {
                          static_cast<std::uint32_t>(index), static_cast<std::uint32_t>(index >> 32U)};
   std::mt19937_64 generator(sequence);
   // Draw all numbers in this order, also the unused ones.
-  const auto factor = [&generator](double magnitude) { return 1.0 + magnitude * symmetric(generator); };
-  Perturbation p;
-  for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel = factor(v.wheels);
-  for (double* brake : {&p.brake_gain, &p.u0, &p.c31}) *brake = factor(v.brake);
-  for (double* tyre : {&p.B, &p.C}) *tyre = factor(v.tyre);
-  p.theta = factor(v.theta);
-  for (double* radius : {&p.r1, &p.r2}) *radius = factor(v.radii);
+  Perturbation p =
+      perturbation_of(v, [&generator](double magnitude) { return 1.0 + magnitude * symmetric(generator); });
   const std::uint64_t sensor_seed = generator();
   p.sensor_seed = v.phase ? sensor_seed : fixed_sensor_seed;
   return p;
 }
 
 Perturbation smallest(const Variation& v) noexcept {
-  Perturbation p;
-  for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel -= v.wheels;
-  for (double* brake : {&p.brake_gain, &p.u0, &p.c31}) *brake -= v.brake;
-  for (double* tyre : {&p.B, &p.C}) *tyre -= v.tyre;
-  p.theta -= v.theta;
-  for (double* radius : {&p.r1, &p.r2}) *radius -= v.radii;
-  return p;
+  return perturbation_of(v, [](double magnitude) { return 1.0 - magnitude; });
 }
 
 plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const Perturbation& p) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <bit>
+#include <boost/endian/conversion.hpp>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -18,16 +18,13 @@ class FieldReader {
   explicit FieldReader(std::span<const std::uint8_t> packet) : rest_(packet) {}
 
   template <class Number>
-    requires std::is_integral_v<Number>
+    requires std::is_arithmetic_v<Number>
   void operator()(std::string_view /*name*/, Number& value) {
-    std::uint64_t bits = 0;
-    if (!read(bits, sizeof value)) return;
-    value = static_cast<Number>(bits);
-    if constexpr (sizeof value == sizeof(std::int32_t)) last_whole_ = static_cast<std::int32_t>(value);
-  }
-  void operator()(std::string_view /*name*/, double& value) {
-    std::uint64_t bits = 0;
-    if (read(bits, sizeof value)) value = std::bit_cast<double>(bits);
+    const std::uint8_t* const bytes = take(sizeof value);
+    if (bytes == nullptr) return;
+    value = boost::endian::endian_load<Number, sizeof value, boost::endian::order::big>(bytes);
+    if constexpr (std::is_integral_v<Number> && sizeof value == sizeof(std::int32_t))
+      last_whole_ = static_cast<std::int32_t>(value);
   }
   /// The length is the field before, an int32_t (lcmtypes/message_fields.py).
   void operator()(std::string_view name, std::vector<double>& values) {
@@ -38,8 +35,9 @@ class FieldReader {
   }
   /// A string is its length with the final NUL, then its bytes with the NUL.
   void operator()(std::string_view /*name*/, std::string& value) {
-    std::uint64_t length = 0;
-    if (!read(length, sizeof(std::int32_t))) return;
+    const std::uint8_t* const bytes = take(sizeof(std::int32_t));
+    if (bytes == nullptr) return;
+    const std::size_t length = boost::endian::load_big_u32(bytes);
     sound_ = length > 0 && length <= rest_.size() && rest_[length - 1] == 0;
     if (!sound_) return;
     value.assign(reinterpret_cast<const char*>(rest_.data()), length - 1);
@@ -51,12 +49,13 @@ class FieldReader {
   [[nodiscard]] bool at_end() const noexcept { return rest_.empty(); }
 
  private:
-  bool read(std::uint64_t& bits, std::size_t bytes) {
+  /// The next bytes; null where they do not fit.
+  const std::uint8_t* take(std::size_t bytes) {
     sound_ = sound_ && rest_.size() >= bytes;
-    if (!sound_) return false;
-    for (std::size_t i = 0; i < bytes; ++i) bits = bits << 8U | rest_[i];
+    if (!sound_) return nullptr;
+    const std::uint8_t* const taken = rest_.data();
     rest_ = rest_.subspan(bytes);
-    return true;
+    return taken;
   }
 
   std::span<const std::uint8_t> rest_;

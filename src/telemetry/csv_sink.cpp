@@ -1,8 +1,9 @@
 // A row of the run's CSV each cycle.
 #include "telemetry/csv_sink.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -16,21 +17,6 @@ namespace {
 
 constexpr std::size_t block_bytes = 65'536;
 constexpr std::string_view csv_kind = "CSV file";
-
-constexpr std::size_t header_size = [] {
-  std::size_t size = rig::csv_columns.size() - 1;
-  for (const std::string_view name : rig::csv_columns) size += name.size();
-  return size;
-}();
-constexpr auto header_text = [] {
-  std::array<char, header_size> text{};
-  auto at = text.begin();
-  for (const std::string_view name : rig::csv_columns) {
-    if (at != text.begin()) *at++ = ',';
-    at = std::copy(name.begin(), name.end(), at);
-  }
-  return text;
-}();
 
 // The longest double is -1.2345678901234567e-308, the longest whole number has a sign and 19 digits.
 constexpr std::size_t longest_value = 24;
@@ -53,7 +39,7 @@ char* put(char* at, const Value& value) noexcept {
 
 }  // namespace
 
-constinit const std::string_view csv_header(header_text.data(), header_text.size());
+const std::string csv_header = fmt::format("{}", fmt::join(rig::csv_columns, ","));
 
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
                            const rig::RunNames& names) noexcept {

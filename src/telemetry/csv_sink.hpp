@@ -16,7 +16,7 @@ namespace abs_hil::telemetry {
 
 /// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns
 /// may be added at the end. In a file `phase_name` and the columns of the controller's own signals follow it.
-extern const std::string_view csv_header;
+extern const std::string csv_header;
 
 /// Upper limit of a row's length.
 inline constexpr std::size_t csv_row_max_bytes = 1024;

@@ -8,6 +8,9 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
+
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -28,25 +31,12 @@ class CsvRow {
   }
   void operator()(std::string_view /*name*/, const std::string& value) { text(value); }
   void text(std::string_view value) {
-    separate();
-    if (value.find_first_of(",\"\r\n") == std::string_view::npos) {
-      row_ += value;
-      return;
-    }
-    row_ += '"';
-    for (const char c : value) {
-      if (c == '"') row_ += '"';
-      row_ += c;
-    }
-    row_ += '"';
+    if (!std::exchange(first_, false)) row_ += ',';
+    row_ += rig::csv_field(value);
   }
   [[nodiscard]] const std::string& row() const noexcept { return row_; }
 
  private:
-  void separate() {
-    if (!first_) row_ += ',';
-    first_ = false;
-  }
   std::string row_;
   bool first_{true};
 };

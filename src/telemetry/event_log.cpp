@@ -2,6 +2,7 @@
 #include "telemetry/event_log.hpp"
 
 #include <array>
+#include <boost/endian/conversion.hpp>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -14,29 +15,14 @@ constexpr std::size_t header_bytes = 28;  // sync, number, timestamp, length of 
 constexpr std::uint32_t channel_max_bytes = 63;
 constexpr std::uint32_t data_max_bytes = 1U << 28U;  // LCM's own limit
 
-template <class Unsigned>
-Unsigned big_endian(const std::uint8_t* bytes) {
-  Unsigned value = 0;
-  for (std::size_t i = 0; i < sizeof value; ++i) value = static_cast<Unsigned>(value << 8U | bytes[i]);
-  return value;
-}
-
-template <class Unsigned>
-std::uint8_t* put_big_endian(std::uint8_t* to, Unsigned value) {
-  for (std::size_t i = 0; i < sizeof value; ++i) {
-    *to++ = static_cast<std::uint8_t>(value >> (8 * (sizeof value - 1 - i)));
-  }
-  return to;
-}
-
 }  // namespace
 
-EventLogReader::EventLogReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(std::fopen(path_.string().c_str(), "rb")) {
+EventLogReader::EventLogReader(std::filesystem::path path) : path_(std::move(path)), file_(path_, std::ios::binary) {
   std::error_code error;
   if (file_) size_ = std::filesystem::file_size(path_, error);
   if (!file_ || error) {
-    throw RecordingError("'" + path_.string() + "': " + (file_ ? "not a regular file" : std::strerror(errno)) +
+    throw RecordingError("'" + path_.string() +
+                         "': " + (file_.is_open() ? "not a regular file" : std::strerror(errno)) +
                          "; give an LCM event log (.lcmlog), as --log writes it");
   }
 }
@@ -48,10 +34,11 @@ std::string EventLogReader::place(const std::string& what) const {
 /// A log ends in the middle of a message. If another message follows, it is a damaged length that says so.
 std::optional<LogEvent> EventLogReader::end_cut_off() {
   if (events_ == 0) fail("not an LCM event log");
-  if (std::fseek(file_.get(), static_cast<long>(at_ + sizeof sync_word), SEEK_SET) != 0) fail(std::strerror(errno));
+  file_.clear();
+  if (!file_.seekg(static_cast<std::streamoff>(at_ + sizeof sync_word))) fail(std::strerror(errno));
   std::uint32_t last = 0;
-  for (int byte = std::getc(file_.get()); byte != EOF; byte = std::getc(file_.get())) {
-    last = last << 8U | static_cast<std::uint32_t>(byte);
+  for (char byte = 0; file_.get(byte);) {
+    last = last << 8U | static_cast<unsigned char>(byte);
     if (last == sync_word) fail("the file is damaged: its length reaches beyond the end, but other events follow");
   }
   cut_ = place("the file is cut off, as that of a program that was killed; it is read up to here");
@@ -60,17 +47,21 @@ std::optional<LogEvent> EventLogReader::end_cut_off() {
 
 std::optional<LogEvent> EventLogReader::next() {
   std::array<std::uint8_t, header_bytes> header{};
-  const std::size_t read = std::fread(header.data(), 1, header.size(), file_.get());
-  if (read == 0 && std::feof(file_.get()) != 0) return std::nullopt;
-  if (read >= sizeof sync_word && big_endian<std::uint32_t>(header.data()) != sync_word) {
+  const auto read_into = [this](void* to, std::size_t size) {
+    file_.read(static_cast<char*>(to), static_cast<std::streamsize>(size));
+    return static_cast<std::size_t>(file_.gcount());
+  };
+  const std::size_t read = read_into(header.data(), header.size());
+  if (read == 0 && file_.eof()) return std::nullopt;
+  if (read >= sizeof sync_word && boost::endian::load_big_u32(header.data()) != sync_word) {
     fail(events_ == 0 ? "not an LCM event log" : "the file is damaged: no event begins here");
   }
   if (read != header.size()) return end_cut_off();
   LogEvent event;
-  event.number = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[4]));
-  event.timestamp_us = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[12]));
-  const auto channel_bytes = big_endian<std::uint32_t>(&header[20]);
-  const auto data_bytes = big_endian<std::uint32_t>(&header[24]);
+  event.number = boost::endian::load_big_s64(&header[4]);
+  event.timestamp_us = boost::endian::load_big_s64(&header[12]);
+  const std::uint32_t channel_bytes = boost::endian::load_big_u32(&header[20]);
+  const std::uint32_t data_bytes = boost::endian::load_big_u32(&header[24]);
   if (channel_bytes == 0 || channel_bytes > channel_max_bytes || data_bytes > data_max_bytes) {
     fail("the file is damaged: these lengths are not valid");
   }
@@ -79,8 +70,8 @@ std::optional<LogEvent> EventLogReader::next() {
   if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) return end_cut_off();
   event.channel.resize(channel_bytes);
   event.data.resize(data_bytes);
-  if (std::fread(event.channel.data(), 1, channel_bytes, file_.get()) != channel_bytes ||
-      std::fread(event.data.data(), 1, data_bytes, file_.get()) != data_bytes) {
+  if (read_into(event.channel.data(), channel_bytes) != channel_bytes ||
+      read_into(event.data.data(), data_bytes) != data_bytes) {
     fail("it changed while it was read");
   }
   at_ += header_bytes + channel_bytes + data_bytes;
@@ -97,11 +88,11 @@ std::string for_each_event(const std::filesystem::path& log, const std::function
 void EventLogWriter::write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
                            std::span<const std::uint8_t> data) {
   std::array<std::uint8_t, header_bytes> header{};
-  std::uint8_t* to = put_big_endian(header.data(), sync_word);
-  to = put_big_endian(to, static_cast<std::uint64_t>(number));
-  to = put_big_endian(to, static_cast<std::uint64_t>(timestamp_us));
-  to = put_big_endian(to, static_cast<std::uint32_t>(channel.size()));
-  put_big_endian(to, static_cast<std::uint32_t>(data.size()));
+  boost::endian::store_big_u32(header.data(), sync_word);
+  boost::endian::store_big_s64(&header[4], number);
+  boost::endian::store_big_s64(&header[12], timestamp_us);
+  boost::endian::store_big_u32(&header[20], static_cast<std::uint32_t>(channel.size()));
+  boost::endian::store_big_u32(&header[24], static_cast<std::uint32_t>(data.size()));
   file_.append({reinterpret_cast<const char*>(header.data()), header.size()});
   file_.append(channel);
   file_.append({reinterpret_cast<const char*>(data.data()), data.size()});

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -32,13 +31,6 @@ struct LogEvent {
   std::vector<std::uint8_t> data;
 };
 
-namespace detail {
-struct FileCloser {
-  void operator()(std::FILE* file) const noexcept { static_cast<void>(std::fclose(file)); }
-};
-using FilePointer = std::unique_ptr<std::FILE, FileCloser>;
-}  // namespace detail
-
 /// Reads LCM's event logs. It checks sync words, lengths and event numbers. lcm::LogFile skips damage silently instead.
 /// A killed program leaves a part of a message at the end of its log: there the log ends, and `cut` says so.
 class EventLogReader {
@@ -57,7 +49,7 @@ class EventLogReader {
   std::optional<LogEvent> end_cut_off();
 
   std::filesystem::path path_;
-  detail::FilePointer file_;
+  std::ifstream file_;
   std::uint64_t size_{0};
   std::uint64_t at_{0};
   std::int64_t events_{0};

@@ -1,9 +1,19 @@
-// Takes LCM's URLs apart.
+// What an LCM URL leads to: its parts, the route to its network, a tcpq server that answers.
 #include "telemetry/lcm_url.hpp"
 
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <boost/endian/conversion.hpp>
+#include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstdlib>
 #include <stdexcept>
+#include <system_error>
 
 namespace abs_hil::telemetry {
 
@@ -44,6 +54,137 @@ std::string default_lcm_url() {
   const char* from_environment = std::getenv("LCM_DEFAULT_URL");
   if (from_environment != nullptr && *from_environment != '\0') return from_environment;
   return "udpm://239.255.76.67:7667?ttl=0";
+}
+
+std::optional<sockaddr_in> socket_address_of(const Endpoint& endpoint) noexcept {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(endpoint.port);
+  if (::inet_pton(AF_INET, endpoint.address.c_str(), &address.sin_addr) != 1) return std::nullopt;
+  return address;
+}
+
+namespace {
+
+constexpr std::uint32_t server_greeting = 0x287617fa;
+constexpr std::uint32_t client_greeting = 0x287617fb;
+constexpr std::uint32_t protocol_version = 0x0100;
+/// The kernel grants at most twice net.core.wmem_max, about 400 kB by default. It reports room while a third is free.
+constexpr int send_buffer_bytes = 1 << 20;
+
+class Socket {
+ public:
+  explicit Socket(int type) : descriptor_(::socket(AF_INET, type | SOCK_CLOEXEC, 0)) {}
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  ~Socket() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  [[nodiscard]] int get() const noexcept { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+class Deadline {
+ public:
+  explicit Deadline(int timeout_ms) : end_(Clock::now() + std::chrono::milliseconds(timeout_ms)) {}
+  /// False if it does not become ready in time.
+  [[nodiscard]] bool wait(int socket, short events) const noexcept {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end_ - Clock::now()).count();
+    pollfd ready{socket, events, 0};
+    return left > 0 && ::poll(&ready, 1, static_cast<int>(left)) > 0;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point end_;
+};
+
+constexpr const char* route_fix =
+    "sudo ip link set lo up multicast on\n"
+    "sudo ip route add 224.0.0.0/4 dev lo";
+
+/// errno of a connected UDP socket to `to`, 0 if there is a route. Sends nothing.
+int connect_udp(const sockaddr_in& to) {
+  const Socket socket(SOCK_DGRAM);
+  if (socket.get() < 0) return errno;
+  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 ? 0 : errno;
+}
+
+RouteProbe probe_udpm(const Endpoint& endpoint) {
+  const auto to = socket_address_of(endpoint);
+  if (!to) {
+    return {false, "'" + endpoint.address + "' is not an IPv4 address", "use udpm://239.255.76.67:7667?ttl=0"};
+  }
+  const std::string where = endpoint.address + ":" + std::to_string(endpoint.port);
+  if (!IN_MULTICAST(ntohl(to->sin_addr.s_addr))) {
+    return {false, endpoint.address + " is not a multicast address",
+            "use one from 224.0.0.0 to 239.255.255.255, as in udpm://239.255.76.67:7667?ttl=0"};
+  }
+  const int error = connect_udp(*to);
+  if (error == 0) return {true, {}, {}};
+  if (error == ENETUNREACH || error == EHOSTUNREACH || error == ENETDOWN) {
+    return {false, "no route for multicast to " + where, route_fix};
+  }
+  return {false, "cannot use UDP multicast to " + where + ": " + std::generic_category().message(error), route_fix};
+}
+
+RouteProbe probe_tcpq(const Endpoint& endpoint) {
+  if (!socket_address_of(endpoint)) {
+    // LCM 1.3 ignores a failure of inet_aton and would connect to a wrong address.
+    return {false, "tcpq needs a numeric IPv4 address, not '" + endpoint.address + "'", "use tcpq://127.0.0.1:7700"};
+  }
+  return {true, {}, "needs lcm-tcpq-server at " + endpoint.address + ":" + std::to_string(endpoint.port)};
+}
+
+}  // namespace
+
+RouteProbe probe_lcm_route(std::string_view url) {
+  try {
+    const LcmUrl parts = parse_lcm_url(url);
+    if (parts.provider == "udpm") return probe_udpm(endpoint_of(parts));
+    if (parts.provider == "tcpq") return probe_tcpq(endpoint_of(parts));
+    if (parts.provider == "memq") return {true, {}, "messages stay within this process"};
+    if (parts.provider == "file") return {true, {}, "needs a path that can be written and ?mode=w"};
+    return {true, {}, "provider '" + parts.provider + "' is unknown; only LCM can check it"};
+  } catch (const std::invalid_argument& error) {
+    return {false, error.what(), "use udpm://239.255.76.67:7667?ttl=0"};
+  }
+}
+
+TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept {
+  const Deadline deadline(timeout_ms);
+  const auto to = socket_address_of(endpoint);
+  const Socket socket(SOCK_STREAM | SOCK_NONBLOCK);
+  if (socket.get() < 0 || !to) return TcpqServer::absent;
+  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&*to), sizeof *to) != 0) {
+    if (errno != EINPROGRESS) return TcpqServer::absent;
+    if (!deadline.wait(socket.get(), POLLOUT)) return TcpqServer::silent;
+    int error = 0;
+    socklen_t size = sizeof error;
+    if (::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size) != 0 || error != 0) return TcpqServer::absent;
+  }
+  const std::array<std::uint32_t, 2> greeting{htonl(client_greeting), htonl(protocol_version)};
+  if (::send(socket.get(), greeting.data(), sizeof greeting, MSG_NOSIGNAL) != sizeof greeting) {
+    return TcpqServer::absent;
+  }
+  constexpr std::size_t answer_bytes = 8;
+  std::array<std::uint8_t, answer_bytes> answer{};
+  for (std::size_t got = 0; got < answer.size();) {
+    if (!deadline.wait(socket.get(), POLLIN)) return TcpqServer::silent;
+    const ssize_t size = ::recv(socket.get(), answer.data() + got, answer.size() - got, 0);
+    if (size <= 0) return TcpqServer::absent;
+    got += static_cast<std::size_t>(size);
+  }
+  return boost::endian::load_big_u32(answer.data()) == server_greeting ? TcpqServer::answers : TcpqServer::silent;
+}
+
+bool takes_without_waiting(int socket) noexcept {
+  // Set at every call, because LCM may have connected again.
+  static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &send_buffer_bytes, sizeof send_buffer_bytes));
+  pollfd ready{socket, POLLOUT, 0};
+  return ::poll(&ready, 1, 0) > 0;
 }
 
 }  // namespace abs_hil::telemetry

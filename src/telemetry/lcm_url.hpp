@@ -1,6 +1,9 @@
 #pragma once
 
+#include <netinet/in.h>
+
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -25,6 +28,9 @@ struct Endpoint {
 /// Address and port of a udpm:// or tcpq:// URL. Missing parts get LCM's defaults (239.255.76.67:7667,
 /// 127.0.0.1:7700). Throws std::invalid_argument for an invalid port.
 [[nodiscard]] Endpoint endpoint_of(const LcmUrl& url);
+
+/// The same for the system; nothing if the address is no IPv4 address in numbers.
+[[nodiscard]] std::optional<sockaddr_in> socket_address_of(const Endpoint& endpoint) noexcept;
 
 /// The environment's LCM_DEFAULT_URL, else udpm://239.255.76.67:7667?ttl=0, which stays within this computer.
 [[nodiscard]] std::string default_lcm_url();

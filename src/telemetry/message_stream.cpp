@@ -6,6 +6,7 @@
 #include <cmath>
 #include <exception>
 #include <stdexcept>
+#include <tuple>
 
 #include "abs_hil/adjustment_t.hpp"
 #include "files/result_file.hpp"
@@ -25,29 +26,27 @@ void check(const StreamOptions& options) {
 /// The next time on the grid of `period_s` after `now_s`, so that a late message does not delay later ones.
 double next_on_grid(double now_s, double period_s) { return (std::floor(now_s / period_s + 1e-9) + 1.0) * period_s; }
 
-void put_parts(const StatusSnapshot& snapshot, status_t& m) {
-  m.read_p50_us = snapshot.read.p50_us;
-  m.read_p99_us = snapshot.read.p99_us;
-  m.read_p99_9_us = snapshot.read.p99_9_us;
-  m.read_max_us = snapshot.read.max_us;
-  m.control_p50_us = snapshot.control.p50_us;
-  m.control_p99_us = snapshot.control.p99_us;
-  m.control_p99_9_us = snapshot.control.p99_9_us;
-  m.control_max_us = snapshot.control.max_us;
-  m.write_p50_us = snapshot.write.p50_us;
-  m.write_p99_us = snapshot.write.p99_us;
-  m.write_p99_9_us = snapshot.write.p99_9_us;
-  m.write_max_us = snapshot.write.max_us;
+void put_timing(const rig::TimingSummary& timing, status_t& m) {
+  const auto four = [](const rig::DurationQuantiles& q) { return std::tie(q.p50_us, q.p99_us, q.p99_9_us, q.max_us); };
+  std::tie(m.wakeup_latency_p50_us, m.wakeup_latency_p99_us, m.wakeup_latency_p99_9_us, m.wakeup_latency_max_us) =
+      four(timing.wakeup_latency);
+  std::tie(m.read_p50_us, m.read_p99_us, m.read_p99_9_us, m.read_max_us) = four(timing.read);
+  std::tie(m.control_p50_us, m.control_p99_us, m.control_p99_9_us, m.control_max_us) = four(timing.control);
+  std::tie(m.write_p50_us, m.write_p99_us, m.write_p99_9_us, m.write_max_us) = four(timing.write);
+  std::tie(m.cycle_time_p50_us, m.cycle_time_p99_us, m.cycle_time_p99_9_us, m.cycle_time_max_us) =
+      four(timing.cycle_time);
 
-  const auto late = [&snapshot](rig::OverrunCause cause) { return static_cast<std::int64_t>(snapshot.late.of(cause)); };
-  m.overruns_wakeup = late(rig::OverrunCause::wakeup);
-  m.overruns_read = late(rig::OverrunCause::read);
-  m.overruns_control = late(rig::OverrunCause::control);
-  m.overruns_write = late(rig::OverrunCause::write);
-  m.overruns_record = late(rig::OverrunCause::record);
-  m.overruns_startup = static_cast<std::int64_t>(snapshot.late.startup);
-  m.overruns_longest_run = static_cast<std::int64_t>(snapshot.late.longest_run);
-  m.ticks_missed = static_cast<std::int64_t>(snapshot.late.ticks_missed);
+  const rig::OverrunCounts& late = timing.overruns;
+  const auto of = [&late](rig::OverrunCause cause) { return static_cast<std::int64_t>(late.of(cause)); };
+  m.overruns = static_cast<std::int64_t>(late.total);
+  m.overruns_wakeup = of(rig::OverrunCause::wakeup);
+  m.overruns_read = of(rig::OverrunCause::read);
+  m.overruns_control = of(rig::OverrunCause::control);
+  m.overruns_write = of(rig::OverrunCause::write);
+  m.overruns_record = of(rig::OverrunCause::record);
+  m.overruns_startup = static_cast<std::int64_t>(late.startup);
+  m.overruns_longest_run = static_cast<std::int64_t>(late.longest_run);
+  m.ticks_missed = static_cast<std::int64_t>(late.ticks_missed);
 }
 
 }  // namespace
@@ -86,7 +85,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
 void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
   latest_ = record;
   if (!started_ || record.time_s >= next_experiment_s_) {
-    send_experiment();
+    send(experiment_, experiment_message_);
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
   // A replay needs the answer. It may have come from a person or from the simulation.
@@ -182,23 +181,12 @@ void MessageStream::send_status() {
   m.time_s = latest_.time_s;
   m.phase = static_cast<std::int8_t>(latest_.phase);
   m.cycles = static_cast<std::int64_t>(snapshot.cycles);
-  m.overruns = static_cast<std::int64_t>(snapshot.overruns);
   m.telemetry_drops = static_cast<std::int64_t>(snapshot.telemetry_drops);
   m.publish_failures = static_cast<std::int64_t>(failures());
   m.realtime = static_cast<std::int8_t>(snapshot.realtime);
-  m.wakeup_latency_p50_us = snapshot.wakeup_latency.p50_us;
-  m.wakeup_latency_p99_us = snapshot.wakeup_latency.p99_us;
-  m.wakeup_latency_p99_9_us = snapshot.wakeup_latency.p99_9_us;
-  m.wakeup_latency_max_us = snapshot.wakeup_latency.max_us;
-  m.cycle_time_p50_us = snapshot.cycle_time.p50_us;
-  m.cycle_time_p99_us = snapshot.cycle_time.p99_us;
-  m.cycle_time_p99_9_us = snapshot.cycle_time.p99_9_us;
-  m.cycle_time_max_us = snapshot.cycle_time.max_us;
   m.unjudged_share = snapshot.checks_unjudged;
-  put_parts(snapshot, m);
+  put_timing(snapshot.timing, m);
   send(status_channel_, m);
 }
-
-void MessageStream::send_experiment() { send(experiment_, experiment_message_); }
 
 }  // namespace abs_hil::telemetry

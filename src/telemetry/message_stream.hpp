@@ -92,7 +92,6 @@ class MessageStream : public rig::RecordSink {
   void send(Channel& channel, Message& message);
   void send_event(std::string_view kind, rig::Reason reason, double value, std::string message);
   void send_status();
-  void send_experiment();
 
   StreamOptions options_;
   StatusSource status_;

@@ -47,13 +47,14 @@ std::vector<std::string> fields_of(const rig::CycleRecord& record, const StatusS
                                               number(speeds.omega1_rad_s, 6, 1), number(speeds.omega2_rad_s, 6, 1)),
                                   fmt::format("slip {}", number(rig::best_slip(record), 5, 2)),
                                   fmt::format("θ̂ {} N", number(record.control.theta_est_N, 6, 2)),
-                                  fmt::format("overruns {}", status.overruns),
+                                  fmt::format("overruns {}", status.timing.overruns.total),
                                   fmt::format("drops {}", status.telemetry_drops),
                                   fmt::format("gate {}", status.gate_interventions)};
-  const bool timed = std::isfinite(status.wakeup_latency.p50_us) && std::isfinite(status.cycle_time.p50_us);
+  const bool timed =
+      std::isfinite(status.timing.wakeup_latency.p50_us) && std::isfinite(status.timing.cycle_time.p50_us);
   if (timed) {
-    fields.push_back(fmt::format("wake-up {} us", quantiles(status.wakeup_latency)));
-    fields.push_back(fmt::format("cycle {} us", quantiles(status.cycle_time)));
+    fields.push_back(fmt::format("wake-up {} us", quantiles(status.timing.wakeup_latency)));
+    fields.push_back(fmt::format("cycle {} us", quantiles(status.timing.cycle_time)));
   }
   return fields;
 }

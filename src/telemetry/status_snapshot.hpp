@@ -11,18 +11,12 @@ namespace abs_hil::telemetry {
 /// Data from the owner of the run for ABS_STATUS and the status line. All counts are since the start.
 struct StatusSnapshot {
   std::uint64_t cycles{0};
-  std::uint64_t overruns{0};            ///< cycles that missed at least one tick
   std::uint64_t telemetry_drops{0};     ///< records that found the ring full
   std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
   double checks_unjudged{
       rig::unknown};     ///< share of the time in which the gate's checks could not judge; NaN: not known
   bool realtime{false};  ///< real-time scheduling and locked memory are in force
-  rig::DurationQuantiles wakeup_latency{};
-  rig::DurationQuantiles cycle_time{};
-  rig::DurationQuantiles read{};
-  rig::DurationQuantiles control{};
-  rig::DurationQuantiles write{};
-  rig::OverrunCounts late{};  ///< `overruns` by cause
+  rig::TimingSummary timing{};
 };
 
 /// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.

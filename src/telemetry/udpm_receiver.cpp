@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <boost/endian/conversion.hpp>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -23,12 +24,6 @@ constexpr std::uint32_t fragment_magic = 0x4C433033;
 constexpr std::size_t whole_header_bytes = 8;
 constexpr std::size_t fragment_header_bytes = 20;
 constexpr std::size_t fragment_number_at = 16;
-
-std::uint32_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) {
-  std::uint32_t word = 0;
-  for (const std::uint8_t byte : bytes.subspan(at, sizeof word)) word = word << 8U | byte;
-  return word;
-}
 
 /// The bytes after `channel` and its NUL; null if the datagram has another channel.
 const std::uint8_t* after_channel(std::span<const std::uint8_t> bytes, std::string_view channel) {
@@ -86,7 +81,7 @@ bool join(int socket, const sockaddr_in& group, int buffer_bytes) {
 
 LcmPacket look_at(std::span<const std::uint8_t> datagram, std::string_view channel) noexcept {
   if (datagram.size() < whole_header_bytes) return {};
-  const std::uint32_t magic = word_at(datagram, 0);
+  const std::uint32_t magic = boost::endian::load_big_u32(datagram.data());
   if (magic == whole_magic) {
     const std::uint8_t* payload = after_channel(datagram.subspan(whole_header_bytes), channel);
     if (payload == nullptr) return {};
@@ -102,13 +97,10 @@ UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channe
   const LcmUrl parts = parse_lcm_url(url);
   own_computer_only_ = number_in(parts.options, "ttl=") == 0;
   const Endpoint endpoint = endpoint_of(parts);
-  sockaddr_in group{};
-  group.sin_family = AF_INET;
-  group.sin_port = htons(endpoint.port);
   errno = EINVAL;
-  if (::inet_pton(AF_INET, endpoint.address.c_str(), &group.sin_addr) == 1) {
+  if (const auto group = socket_address_of(endpoint)) {
     socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (socket_ >= 0 && join(socket_, group, number_in(parts.options, "recv_buf_size="))) return;
+    if (socket_ >= 0 && join(socket_, *group, number_in(parts.options, "recv_buf_size="))) return;
   }
   const std::string reason = std::generic_category().message(errno);
   if (socket_ >= 0) ::close(socket_);

@@ -85,7 +85,7 @@ TEST_CASE("the adaptive controller reports the states of (17), and V and V' of T
   s.options.adaptive.zeta0 = 15.0;
   s.omega1_start = 0.95 * s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m;
   s.max_time_s = 0.5;
-  const control::AdaptiveController controller({s.options, s.rig});
+  const control::LawController<control::AdaptiveLaw> controller({s.options, s.rig});
   std::vector<std::string_view> names;
   for (const rig::Signal& signal : controller.signals()) names.push_back(signal.name);
   CHECK(names == std::vector<std::string_view>{"I_m", "omega1_hat_rad_s", "zeta_N", "V", "V_dot"});

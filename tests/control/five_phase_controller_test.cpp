@@ -53,16 +53,17 @@ struct Change {
   BrakePhase phase;
 };
 
-std::vector<Change> walk(control::FivePhaseController& c, const rig::RigParameters& rig, double h, double end_s) {
+std::vector<Change> walk(control::LawController<control::FivePhaseLaw>& c, const rig::RigParameters& rig, double h,
+                         double end_s) {
   std::vector<Change> changes;
   auto in = input_at(rig, dip(0.0), 0.0);
   c.reset(in);
-  BrakePhase before = c.phase();
+  BrakePhase before = c.law().phase();
   for (int n = 0; n * h < end_s; ++n) {
     in = input_at(rig, dip(n * h), n > 0 ? h : 0.0);
     (void)c.step(in);
-    if (c.phase() != before) changes.push_back({n * h, c.phase()});
-    before = c.phase();
+    if (c.law().phase() != before) changes.push_back({n * h, c.law().phase()});
+    before = c.law().phase();
   }
   return changes;
 }
@@ -73,7 +74,7 @@ TEST_CASE("On a wheel that dips and comes back the five phases follow each other
   const double rate_Hz = GENERATE(100.0, 1000.0, 10'000.0);
   const auto options = options_of_test(rate_Hz);
   const rig::RigParameters rig;
-  control::FivePhaseController c{{options, rig}};
+  control::LawController<control::FivePhaseLaw> c{{options, rig}};
   const double h = 1.0 / rate_Hz;
   const auto changes = walk(c, rig, h, 0.7);
   // Where the trace crosses: -20 at 0.054, -40 at 0.062, +5 at 0.146, below +10 after its peak at 0.2245, -20 at
@@ -95,7 +96,7 @@ TEST_CASE("On a wheel that dips and comes back the five phases follow each other
 TEST_CASE("The torque follows the ramps of the phases, in N m/s, within what the actuator can give") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
-  control::FivePhaseController c{{options, rig}};
+  control::LawController<control::FivePhaseLaw> c{{options, rig}};
   const double h = 1e-3;
   auto in = input_at(rig, -5.0, 0.0);
   c.reset(in);
@@ -110,16 +111,16 @@ TEST_CASE("The torque follows the ramps of the phases, in N m/s, within what the
   hold_for(-5.0, 49);
   CHECK_THAT(torque, WithinAbs(3.0, 1e-12));
   hold_for(-25.0, 20);
-  CHECK(c.phase() == BrakePhase::hold);
+  CHECK(c.law().phase() == BrakePhase::hold);
   CHECK_THAT(torque, WithinAbs(3.0, 1e-12));
   hold_for(-50.0, 10);
-  CHECK(c.phase() == BrakePhase::release);
+  CHECK(c.law().phase() == BrakePhase::release);
   CHECK_THAT(torque, WithinAbs(2.0, 1e-12));
   hold_for(20.0, 10);
-  CHECK(c.phase() == BrakePhase::recover);
+  CHECK(c.law().phase() == BrakePhase::recover);
   CHECK_THAT(torque, WithinAbs(2.0, 1e-12));
   hold_for(-5.0, 10);
-  CHECK(c.phase() == BrakePhase::reapply);
+  CHECK(c.law().phase() == BrakePhase::reapply);
   CHECK_THAT(torque, WithinAbs(2.1, 1e-12));
   hold_for(-5.0, 5000);
   CHECK(torque == 9.03);
@@ -130,7 +131,7 @@ TEST_CASE("The torque follows the ramps of the phases, in N m/s, within what the
 TEST_CASE("Every phase ends") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
-  control::FivePhaseController c{{options, rig}};
+  control::LawController<control::FivePhaseLaw> c{{options, rig}};
   auto in = input_at(rig, -25.0, 0.0);
   c.reset(in);
   const auto cycles_in = [&](BrakePhase phase, double acceleration) {
@@ -138,27 +139,27 @@ TEST_CASE("Every phase ends") {
     do {
       (void)c.step(in = input_at(rig, acceleration, 1e-3));
       ++n;
-    } while (c.phase() == phase && n < 10'000);
+    } while (c.law().phase() == phase && n < 10'000);
     return n;
   };
   (void)c.step(in);
-  REQUIRE(c.phase() == BrakePhase::hold);
+  REQUIRE(c.law().phase() == BrakePhase::hold);
   CHECK(std::abs(cycles_in(BrakePhase::hold, -25.0) - 50) <= 1);  // hold_limit_s
-  REQUIRE(c.phase() == BrakePhase::reapply);
+  REQUIRE(c.law().phase() == BrakePhase::reapply);
   (void)c.step(in = input_at(rig, -50.0, 1e-3));
   (void)c.step(in);
-  REQUIRE(c.phase() == BrakePhase::release);
+  REQUIRE(c.law().phase() == BrakePhase::release);
   // The torque is 0 and the wheel does not accelerate: after recover_limit_s it counts as free.
   CHECK(cycles_in(BrakePhase::release, -1.0) <= 102);
-  REQUIRE(c.phase() == BrakePhase::recover);
+  REQUIRE(c.law().phase() == BrakePhase::recover);
   CHECK(std::abs(cycles_in(BrakePhase::recover, -1.0) - 100) <= 1);
-  CHECK(c.phase() == BrakePhase::reapply);
+  CHECK(c.law().phase() == BrakePhase::reapply);
 }
 
 TEST_CASE("Five-phase does not use the slip or the car's speed") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
-  control::FivePhaseController one{{options, rig}}, other{{options, rig}};
+  control::LawController<control::FivePhaseLaw> one{{options, rig}}, other{{options, rig}};
   for (int n = 0; n < 1000; ++n) {
     auto a = input_at(rig, dip(n * 1e-3), n > 0 ? 1e-3 : 0.0);
     auto b = a;
@@ -173,23 +174,23 @@ TEST_CASE("Five-phase does not use the slip or the car's speed") {
       other.reset(b);
     }
     REQUIRE(one.step(a).brake_torque_Nm == other.step(b).brake_torque_Nm);
-    REQUIRE(one.phase() == other.phase());
+    REQUIRE(one.law().phase() == other.law().phase());
   }
 }
 
 TEST_CASE("A wheel that stands is released, though it does not decelerate") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
-  control::FivePhaseController c{{options, rig}};
+  control::LawController<control::FivePhaseLaw> c{{options, rig}};
   auto in = input_at(rig, 0.0, 0.0);
   c.reset(in);
   for (int n = 0; n < 30; ++n) (void)c.step(in = input_at(rig, -2.0, 1e-3));
-  REQUIRE(c.phase() == BrakePhase::apply);
+  REQUIRE(c.law().phase() == BrakePhase::apply);
   in.speeds.omega1_rad_s = 0.0;
   in.alpha1_rad_s2 = 0.0;
   (void)c.step(in);
   (void)c.step(in);
-  CHECK(c.phase() == BrakePhase::release);
+  CHECK(c.law().phase() == BrakePhase::release);
 }
 
 TEST_CASE("Five-phase options out of order are refused") {

@@ -127,7 +127,7 @@ TEST_CASE("After a step of the slip reference e_v follows the exponentials") {
     }
 
    private:
-    control::NominalController inner_;
+    control::LawController<control::NominalLaw> inner_;
     int n_{0};
   };
   bench::Setup s;
@@ -149,7 +149,7 @@ TEST_CASE("theta0 is the plant's own unless another is asked for") {
   control::ControlOptions options;
   const control::SlipInput in{.speeds = {140.0, 170.0}, .slip = 0.17, .slip_ref = 0.15, .max_brake_torque_Nm = 9.0};
   const auto theta_of = [&] {
-    control::NominalController controller{{options, rig}};
+    control::LawController<control::NominalLaw> controller{{options, rig}};
     controller.reset(in);
     return controller.step(in).theta_est_N;
   };
@@ -162,7 +162,7 @@ TEST_CASE("While the torque is limited the integral does not wind up") {
   // A brake of 1 N m cannot bring the slip up: e_v stays far below 0 for a second.
   const rig::RigParameters rig;
   const control::ControlOptions options;
-  control::NominalController controller{{options, rig}};
+  control::LawController<control::NominalLaw> controller{{options, rig}};
   control::SlipInput stuck{
       .dt_s = 1e-3, .speeds = {160.0, 162.0}, .slip = 0.005, .slip_ref = 0.15, .max_brake_torque_Nm = 1.0};
   controller.reset(stuck);

@@ -49,7 +49,8 @@ TEST_CASE("An unknown name is answered with the nearest and all known ones") {
 }
 
 TEST_CASE("A registered controller stands beside ours; a taken or empty name is refused") {
-  constexpr auto entry = control::controller_entry<control::LockedController>("own-locked", "as locked");
+  constexpr auto entry =
+      control::controller_entry<control::LawController<control::LockedLaw>>("own-locked", "as locked");
   const std::size_t before = control::controllers().size();
   control::register_controller(entry);
   REQUIRE(control::controllers().size() == before + 1);

@@ -29,7 +29,7 @@ TEST_CASE("Mixed slip-deceleration is a PI on slip and deceleration in g, by han
   control::ControlOptions options;
   const auto& o = options.mixed_slip_deceleration;
   const rig::RigParameters rig;
-  control::MixedSlipDecelerationController law{{options, rig}};
+  control::LawController<control::MixedSlipDecelerationLaw> law{{options, rig}};
   // r1 omega1' = -g at this acceleration.
   const control::SlipInput in = rolling(0.02, -9.81 / rig.wheels.r1_m);
   const double error = o.target - (0.02 + o.weight);

@@ -94,7 +94,7 @@ constexpr double euler_error = 2 * sampling_error;
 constexpr double force_observer_start_s = 0.003;  ///< it starts without a force
 
 /// (17)-(18) as paper_laws.hpp has them, in explicit Euler steps, with any gains: what the theorems do not hold for is
-/// refused by AdaptiveController, or cannot be told to it.
+/// refused by AdaptiveLaw, or cannot be told to it.
 class EulerLaw final : public control::SlipController {
  public:
   EulerLaw(const bench::Setup& s, const control::paper::Gains<double>& gains)

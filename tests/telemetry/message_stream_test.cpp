@@ -97,11 +97,11 @@ TEST_CASE("status comes at the start, once a second of run time and at the end")
   test::CapturingOutlet outlet;
   StatusSnapshot snapshot;
   snapshot.realtime = true;
-  snapshot.overruns = 3;
+  snapshot.timing.overruns.total = 3;
   snapshot.telemetry_drops = 4;
   snapshot.checks_unjudged = 0.125;
-  snapshot.wakeup_latency = {1.0, 2.0, 3.0, 4.0};
-  snapshot.cycle_time = {5.0, 6.0, 7.0, 8.0};
+  snapshot.timing.wakeup_latency = {1.0, 2.0, 3.0, 4.0};
+  snapshot.timing.cycle_time = {5.0, 6.0, 7.0, 8.0};
   std::uint64_t cycles = 0;
   MessageStream stream({}, info(), [&] {
     snapshot.cycles = cycles;

@@ -58,7 +58,7 @@ TEST_CASE("the line shows phase, speeds, slip, estimate, overruns and drops") {
   r.truth.slip = 0.18;
   r.control.theta_est_N = 22.876;
   StatusSnapshot status;
-  status.overruns = 3;
+  status.timing.overruns.total = 3;
   status.telemetry_drops = 4;
   status.gate_interventions = 5;
   CHECK(format_status_line(r, status) ==

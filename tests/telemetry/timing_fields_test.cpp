@@ -15,14 +15,14 @@ namespace {
 
 StatusSnapshot timed() {
   StatusSnapshot s;
-  s.overruns = 15;
+  s.timing.overruns.total = 15;
   s.telemetry_drops = 9;
-  s.wakeup_latency = {1, 2, 3, 4};
-  s.read = {5, 6, 7, 8};
-  s.control = {9, 10, 11, 12};
-  s.write = {13, 14, 15, 16};
-  s.cycle_time = {17, 18, 19, 20};
-  s.late = {.total = 15, .startup = 6, .ticks_missed = 40, .longest_run = 7, .by_cause = {0, 1, 2, 3, 4, 5}};
+  s.timing.wakeup_latency = {1, 2, 3, 4};
+  s.timing.read = {5, 6, 7, 8};
+  s.timing.control = {9, 10, 11, 12};
+  s.timing.write = {13, 14, 15, 16};
+  s.timing.cycle_time = {17, 18, 19, 20};
+  s.timing.overruns = {.total = 15, .startup = 6, .ticks_missed = 40, .longest_run = 7, .by_cause = {0, 1, 2, 3, 4, 5}};
   return s;
 }
 

@@ -80,7 +80,7 @@ struct MixedSlipDecelerationOptions {
                  .range = rig::from_zero(1e6));
 };
 
-/// Accelerations are those of the wheel's circumference, r1 omega1'. FivePhaseController names the phases.
+/// Accelerations are those of the wheel's circumference, r1 omega1'. FivePhaseLaw names the phases.
 template <class S = double>
 struct FivePhaseOptions {
   ABS_HIL_LANE_OPTIONS(FivePhaseOptions, S);

@@ -35,8 +35,7 @@ class BasicSlipErrorDynamics {
  public:
   BasicSlipErrorDynamics() = default;
   /// Throws std::invalid_argument if ks0, ks1, the control rate or v_min_m_s is not > 0.
-  explicit BasicSlipErrorDynamics(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+  explicit BasicSlipErrorDynamics(const ControllerContext& context);
 
   /// Tb of (16) for theta0, of (17)-(18) for theta_hat.
   /// @param integral_m  I, integral of e_v

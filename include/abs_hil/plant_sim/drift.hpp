@@ -2,6 +2,7 @@
 
 // A plant's position in the profiles of its drifting parameters (docs/plants.md).
 
+#include <array>
 #include <cstddef>
 #include <limits>
 
@@ -131,16 +132,11 @@ class Drift {
   [[nodiscard]] DriftFactors after(double time_s) const noexcept;
 
   void exchange_state(rig::StateBytes& state) {
-    for (FactorProgress* factor : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
-      factor->exchange_state(state);
-    }
+    for (FactorProgress& factor : factors_) factor.exchange_state(state);
   }
 
  private:
-  FactorProgress brake_torque_;
-  FactorProgress motor_torque_;
-  FactorProgress upper_bearing_;
-  FactorProgress lower_bearing_;
+  std::array<FactorProgress, 4> factors_;  ///< in the order of DriftFactors
   bool any_;
 };
 

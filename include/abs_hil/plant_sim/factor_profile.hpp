@@ -45,8 +45,6 @@ class FactorProfile {
   [[nodiscard]] double highest() const noexcept;
 
  private:
-  void read(std::string_view text, Axes axes);
-
   Axis axis_{Axis::time};
   bool from_braking_{false};
   std::vector<Piece> pieces_;

@@ -77,8 +77,7 @@ class BasicLeverLoad {
   /// @param peak_mu            highest friction coefficient of the tyre
   /// @param friction_at_most   highest value of the friction profile
   /// Throws std::invalid_argument if this friction would wedge the lever.
-  BasicLeverLoad(const PlantOptions& options, double peak_mu, double friction_at_most)
-    requires std::is_same_v<S, double>;
+  BasicLeverLoad(const PlantOptions& options, double peak_mu, double friction_at_most);
 
   template <class Direction>
   [[nodiscard]] S force_N(const S& friction, const S& shape,

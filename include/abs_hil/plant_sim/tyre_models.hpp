@@ -71,8 +71,7 @@ class BasicIntecoMu {
  public:
   BasicIntecoMu() = default;
   /// Throws std::invalid_argument if the curve is nowhere positive.
-  explicit BasicIntecoMu(const PlantOptions& options)
-    requires std::is_same_v<S, double>;
+  explicit BasicIntecoMu(const PlantOptions& options);
 
   [[nodiscard]] S slip(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
     return rig::clamped(S((v_x_m_s - v_wheel_m_s) / larger_speed_m_s(v_wheel_m_s, v_x_m_s)), S(-1.0), S(1.0));
@@ -100,10 +99,8 @@ class BasicIntecoMu {
     const S power = rig::power(s, p_);
     return w4_ * power / (a_ + power) + s * (w1_ + s * (w2_ + s * w3_));
   }
-  [[nodiscard]] double highest() const noexcept
-    requires std::is_same_v<S, double>;
-  [[nodiscard]] double slope_bound() const noexcept
-    requires std::is_same_v<S, double>;
+  [[nodiscard]] double highest() const noexcept;
+  [[nodiscard]] double slope_bound() const noexcept;
 
   S w1_{0.0}, w2_{0.0}, w3_{0.0}, w4_{0.0}, a_{0.0}, p_{0.0};  ///< IntecoMuParameters
   S regularisation_m_s_{0.0};

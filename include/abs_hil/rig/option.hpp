@@ -157,11 +157,6 @@ struct GroupRow {
   bool searched{true};      ///< false: the search ranges of the rows do not apply here
 };
 
-template <class Row>
-inline constexpr bool is_group_row = false;
-template <class Struct, class Group>
-inline constexpr bool is_group_row<GroupRow<Struct, Group>> = true;
-
 /// Use of a group: its prefix, and whether a search may set its options.
 struct GroupUse {
   std::string_view prefix;
@@ -264,7 +259,7 @@ void for_each_option(Options& options, const std::string& prefix, const Visit& v
         });
   } else {
     for_each_row<Mutable>([&](const auto& row) {
-      if constexpr (is_group_row<std::remove_cvref_t<decltype(row)>>) {
+      if constexpr (requires { row.searched; }) {
         for_each_option(options.*row.member, std::string(prefix).append(row.prefix), visit, searched && row.searched);
       } else {
         OptionFacts facts = row.facts;

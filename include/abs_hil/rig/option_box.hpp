@@ -1,6 +1,6 @@
 #pragma once
 
-#include <memory>
+#include <any>
 #include <string>
 #include <utility>
 
@@ -14,54 +14,31 @@ class OptionBox {
   template <class Options>
   [[nodiscard]] static OptionBox of(Options options) {
     OptionBox held;
-    held.box_ = std::make_unique<Box<Options>>(std::move(options));
+    held.options_ = std::move(options);
+    held.visit_ = [](std::any& any, const std::string& prefix, const OptionVisitor& visit) {
+      for_each_option(
+          std::any_cast<Options&>(any), prefix,
+          [&visit](const std::string& name, const OptionFacts& facts, auto& value) { visit(name, facts, &value); });
+    };
     return held;
   }
-  OptionBox(const OptionBox& other) : box_(other.box_ ? other.box_->copy() : nullptr) {}
-  OptionBox& operator=(const OptionBox& other) {
-    box_ = other.box_ ? other.box_->copy() : nullptr;
-    return *this;
-  }
-  OptionBox(OptionBox&&) noexcept = default;
-  OptionBox& operator=(OptionBox&&) noexcept = default;
-  ~OptionBox() = default;
 
   /// The options if they have this type, otherwise null.
   template <class Options>
   [[nodiscard]] Options* as() noexcept {
-    auto* box = dynamic_cast<Box<Options>*>(box_.get());
-    return box == nullptr ? nullptr : &box->options;
+    return std::any_cast<Options>(&options_);
   }
   template <class Options>
   [[nodiscard]] const Options* as() const noexcept {
-    const auto* box = dynamic_cast<const Box<Options>*>(box_.get());
-    return box == nullptr ? nullptr : &box->options;
+    return std::any_cast<Options>(&options_);
   }
-  void visit_options(const std::string& prefix, const OptionVisitor& visit) { box_->visit(prefix, visit); }
+  void visit_options(const std::string& prefix, const OptionVisitor& visit) { visit_(options_, prefix, visit); }
 
  private:
-  struct AnyBox {
-    AnyBox() = default;
-    AnyBox(const AnyBox&) = delete;
-    AnyBox& operator=(const AnyBox&) = delete;
-    virtual ~AnyBox() = default;
-    [[nodiscard]] virtual std::unique_ptr<AnyBox> copy() const = 0;
-    virtual void visit(const std::string& prefix, const OptionVisitor& visit) = 0;
-  };
-  template <class Options>
-  struct Box final : AnyBox {
-    explicit Box(Options held) : options(std::move(held)) {}
-    [[nodiscard]] std::unique_ptr<AnyBox> copy() const override { return std::make_unique<Box>(options); }
-    void visit(const std::string& prefix, const OptionVisitor& visit) override {
-      for_each_option(options, prefix, [&visit](const std::string& name, const OptionFacts& facts, auto& value) {
-        visit(name, facts, &value);
-      });
-    }
-    Options options;
-  };
-
   OptionBox() = default;
-  std::unique_ptr<AnyBox> box_{};
+
+  std::any options_{};
+  void (*visit_)(std::any& options, const std::string& prefix, const OptionVisitor& visit){nullptr};
 };
 
 }  // namespace abs_hil::rig

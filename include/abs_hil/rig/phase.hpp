@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -9,16 +11,9 @@ namespace abs_hil::rig {
 enum class Phase : std::uint8_t { idle, accelerate, coast, brake, hold, stopped, fault };
 
 [[nodiscard]] constexpr std::string_view name_of(Phase phase) noexcept {
-  switch (phase) {
-    case Phase::idle: return "idle";
-    case Phase::accelerate: return "accelerate";
-    case Phase::coast: return "coast";
-    case Phase::brake: return "brake";
-    case Phase::hold: return "hold";
-    case Phase::stopped: return "stopped";
-    case Phase::fault: return "fault";
-  }
-  return "fault";
+  constexpr std::array<std::string_view, 7> names{"idle", "accelerate", "coast", "brake", "hold", "stopped", "fault"};
+  const auto number = static_cast<std::size_t>(phase);
+  return number < names.size() ? names[number] : "fault";
 }
 
 }  // namespace abs_hil::rig

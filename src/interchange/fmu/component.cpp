@@ -19,13 +19,6 @@ std::string_view kind_in(const std::string& token) {
 
 constexpr std::string_view state_mark = "abs_hil state 2\n";
 
-/// FNV-1a: finds damage, no ill will.
-std::uint64_t checksum_of(std::string_view bytes) {
-  std::uint64_t sum = 0xcbf29ce484222325ULL;
-  for (const char c : bytes) sum = (sum ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  return sum;
-}
-
 void exchange_text(rig::StateBytes& bytes, std::string& text) {
   std::vector<char> characters(text.begin(), text.end());
   bytes(characters);
@@ -35,11 +28,10 @@ void exchange_text(rig::StateBytes& bytes, std::string& text) {
 }  // namespace
 
 std::string to_bytes(const State& state) {
-  std::string content = state.content;
   rig::StateBytes end;
-  std::uint64_t sum = checksum_of(content);
+  std::uint64_t sum = hash_of(state);  // finds damage, no ill will
   end(sum);
-  return std::string(state_mark) + content + end.written();
+  return std::string(state_mark) + state + end.written();
 }
 
 State state_of(const std::string& bytes) {
@@ -47,13 +39,13 @@ State state_of(const std::string& bytes) {
   if (bytes.size() < around || !bytes.starts_with(state_mark)) {
     throw std::invalid_argument("not a serialised state of this FMU");
   }
-  State state{.content = bytes.substr(state_mark.size(), bytes.size() - around)};
+  State state = bytes.substr(state_mark.size(), bytes.size() - around);
   if (to_bytes(state) != bytes) throw std::invalid_argument("the serialised state is cut short or damaged");
   return state;
 }
 
-Component::Component(std::string name, const std::string& token, const std::string& resources, Logger logger)
-    : name_(std::move(name)), token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
+Component::Component(const std::string& token, const std::string& resources, Logger logger)
+    : token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
   if (!model_ || token != token_of(kind_in(token), *model_)) {
     throw std::invalid_argument("the description (token " + token +
                                 ") does not belong to this binary; export the FMU again");
@@ -142,11 +134,11 @@ void Component::exchange_state(rig::StateBytes& bytes) {
 State Component::state() {
   rig::StateBytes bytes;
   exchange_state(bytes);
-  return {.content = bytes.written()};
+  return bytes.written();
 }
 
 void Component::restore(const State& state) {
-  rig::StateBytes bytes(state.content);
+  rig::StateBytes bytes(state);
   exchange_state(bytes);
 }
 

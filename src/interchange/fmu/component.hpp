@@ -14,9 +14,7 @@ using Logger = std::function<void(bool error, const std::string& text)>;
 
 /// The state of an instance at one time, as bytes of this build: parameters, inputs, outputs and what the model is made
 /// of.
-struct State {
-  std::string content{};
-};
+using State = std::string;
 
 [[nodiscard]] std::string to_bytes(const State& state);
 /// Throws std::invalid_argument for bytes that `to_bytes` did not make.
@@ -26,7 +24,7 @@ struct State {
 class Component {
  public:
   /// @param token  what the description says; @param resources  the folder of the FMU's resources
-  Component(std::string name, const std::string& token, const std::string& resources, Logger logger);
+  Component(const std::string& token, const std::string& resources, Logger logger);
 
   [[nodiscard]] const Variable& variable(std::uint32_t reference) const;
   /// The variable, whose value is about to be set. Throws for an output, and after the start for a parameter that is
@@ -46,7 +44,6 @@ class Component {
  private:
   void exchange_state(rig::StateBytes& bytes);
 
-  std::string name_;
   std::string token_;
   std::unique_ptr<Model> model_;
   State first_{};

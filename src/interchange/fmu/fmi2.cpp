@@ -2,7 +2,7 @@
 
 #include <fmi/fmi2Functions.h>
 
-#include <cstring>
+#include <utility>
 
 #include "interchange/fmu/values.hpp"
 
@@ -10,16 +10,9 @@ namespace {
 
 using namespace abs_hil::interchange::fmu;
 
-Component* of(fmi2Component component) { return static_cast<Component*>(component); }
-
 template <class Action>
 fmi2Status done(fmi2Component component, const Action& action) noexcept {
   return guarded(of(component), fmi2OK, fmi2Error, action);
-}
-
-fmi2Status not_there(fmi2Component component, const char* what) noexcept {
-  if (component != nullptr) of(component)->log(true, std::string(what) + ": this FMU cannot do that");
-  return fmi2Error;
 }
 
 }  // namespace
@@ -41,7 +34,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
   };
   try {
     if (type != fmi2CoSimulation) throw std::invalid_argument("this FMU is for co-simulation only");
-    return new Component(name, guid, path_of(resources == nullptr ? "" : resources), logger);
+    return new Component(guid, path_of(resources == nullptr ? "" : resources), logger);
   } catch (const std::exception& error) {
     logger(true, error.what());
     return nullptr;
@@ -63,81 +56,55 @@ fmi2Status fmi2Reset(fmi2Component component) {
   return done(component, [&] { of(component)->reset(); });
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real v[]) {
-  return done(c, [&] { get_values<double>(*of(c), r, n, v); });
-}
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Integer v[]) {
-  return done(c, [&] { get_values<std::int32_t>(*of(c), r, n, v); });
-}
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Boolean v[]) {
-  return done(c, [&] { get_values<bool>(*of(c), r, n, v); });
-}
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2String v[]) {
-  return done(c, [&] { get_values<std::string>(*of(c), r, n, v); });
-}
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real v[]) {
-  return done(c, [&] { set_values<double>(*of(c), r, n, v); });
-}
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer v[]) {
-  return done(c, [&] { set_values<std::int32_t>(*of(c), r, n, v); });
-}
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Boolean v[]) {
-  return done(c, [&] { set_values<bool>(*of(c), r, n, v); });
-}
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2String v[]) {
-  return done(c, [&] { set_values<std::string>(*of(c), r, n, v); });
-}
+// Reads and sets variables: FMI's name of the type, and the type in the model.
+#define ABS_HIL_VALUES(type, Value)                                                                         \
+  fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2##type v[]) {       \
+    return done(c, [&] { get_values<Value>(*of(c), r, n, v); });                                            \
+  }                                                                                                         \
+  fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2##type v[]) { \
+    return done(c, [&] { set_values<Value>(*of(c), r, n, v); });                                            \
+  }
+ABS_HIL_VALUES(Real, double)
+ABS_HIL_VALUES(Integer, std::int32_t)
+ABS_HIL_VALUES(Boolean, bool)
+ABS_HIL_VALUES(String, std::string)
+#undef ABS_HIL_VALUES
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* state) {
-  return done(c, [&] {
-    if (*state == nullptr) *state = new State;
-    *static_cast<State*>(*state) = of(c)->state();
-  });
+  return done(c, [&] { keep(of(c)->state(), *state); });
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
   return done(c, [&] { of(c)->restore(*static_cast<State*>(state)); });
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* state) {
-  return done(c, [&] {
-    delete static_cast<State*>(*state);
-    *state = nullptr;
-  });
+  return done(c, [&] { delete static_cast<State*>(std::exchange(*state, nullptr)); });
 }
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t* size) {
   return done(c, [&] { *size = to_bytes(*static_cast<State*>(state)).size(); });
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-  return done(c, [&] {
-    const std::string made = to_bytes(*static_cast<State*>(state));
-    if (size < made.size())
-      throw std::invalid_argument("the serialised state needs " + std::to_string(made.size()) + " bytes");
-    std::memcpy(bytes, made.data(), made.size());
-  });
+  return done(c, [&] { write_bytes(*static_cast<State*>(state), bytes, size); });
 }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate* state) {
-  return done(c, [&] {
-    State read = state_of(std::string(bytes, size));
-    if (*state == nullptr) *state = new State;
-    *static_cast<State*>(*state) = std::move(read);
-  });
+  return done(c, [&] { keep(state_of(std::string(bytes, bytes + size)), *state); });
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference[], size_t, const fmi2ValueReference[],
                                         size_t, const fmi2Real[], fmi2Real[]) {
-  return not_there(c, "fmi2GetDirectionalDerivative");
+  return not_there(c, fmi2Error, "fmi2GetDirectionalDerivative");
 }
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference[], size_t, const fmi2Integer[],
                                        const fmi2Real[]) {
-  return not_there(c, "fmi2SetRealInputDerivatives");
+  return not_there(c, fmi2Error, "fmi2SetRealInputDerivatives");
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference[], size_t, const fmi2Integer[],
                                         fmi2Real[]) {
-  return not_there(c, "fmi2GetRealOutputDerivatives");
+  return not_there(c, fmi2Error, "fmi2GetRealOutputDerivatives");
 }
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time_s, fmi2Real duration_s, fmi2Boolean) {
   return done(component, [&] { of(component)->step(time_s, duration_s); });
 }
-fmi2Status fmi2CancelStep(fmi2Component c) { return not_there(c, "fmi2CancelStep"); }
+fmi2Status fmi2CancelStep(fmi2Component c) { return not_there(c, fmi2Error, "fmi2CancelStep"); }
 fmi2Status fmi2GetStatus(fmi2Component, const fmi2StatusKind, fmi2Status*) { return fmi2Discard; }
 fmi2Status fmi2GetRealStatus(fmi2Component, const fmi2StatusKind, fmi2Real*) { return fmi2Discard; }
 fmi2Status fmi2GetIntegerStatus(fmi2Component, const fmi2StatusKind, fmi2Integer*) { return fmi2Discard; }

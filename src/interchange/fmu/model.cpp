@@ -19,16 +19,13 @@ std::unique_ptr<Model> make_model(std::string_view kind) {
 }
 
 std::string token_of(std::string_view kind, const Model& model) {
-  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
-  const auto add = [&hash](std::string_view text) {
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  };
+  std::string names;
   for (const Variable& variable : model.variables()) {
-    add(variable.name);
-    add(std::to_string(variable.value.index()) + ',' + std::to_string(static_cast<int>(variable.causality)) + ';');
+    names += variable.name + std::to_string(variable.value.index()) + ',' +
+             std::to_string(static_cast<int>(variable.causality)) + ';';
   }
   std::array<char, 17> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), hash, 16).ptr;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), hash_of(names), 16).ptr;
   return "abs_hil-" + std::string(kind) + '-' + std::string(digits.data(), end);
 }
 

@@ -46,15 +46,13 @@ class Model {
 
  protected:
   /// The rows of `options` as parameters; rows that `wanted` refuses are left out.
-  template <class Options, class Wanted>
-  void add_parameters(Options& options, const std::string& prefix, const Wanted& wanted) {
+  template <class Options>
+  void add_parameters(
+      Options& options, const std::string& prefix,
+      bool (*wanted)(std::string_view name) = [](std::string_view) { return true; }) {
     rig::for_each_option(options, prefix, [&](const std::string& name, const rig::OptionFacts& facts, auto& value) {
       if (wanted(name)) variables_.push_back({name, facts, Causality::parameter, &value});
     });
-  }
-  template <class Options>
-  void add_parameters(Options& options, const std::string& prefix) {
-    add_parameters(options, prefix, [](std::string_view) { return true; });
   }
   void add(Causality causality, std::string name, const rig::OptionFacts& facts, const rig::OptionTarget& value) {
     variables_.push_back({std::move(name), facts, causality, value});
@@ -70,6 +68,13 @@ inline constexpr std::string_view controller_kind = "controller";
 
 /// The model of that kind with default parameters; null for an unknown kind.
 [[nodiscard]] std::unique_ptr<Model> make_model(std::string_view kind);
+
+/// FNV-1a, 64 bits.
+[[nodiscard]] constexpr std::uint64_t hash_of(std::string_view text) noexcept {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
 
 /// Names, types and order of the variables as a number: a binary refuses a description that another version made.
 [[nodiscard]] std::string token_of(std::string_view kind, const Model& model);

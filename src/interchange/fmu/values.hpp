@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <exception>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "interchange/fmu/component.hpp"
 
@@ -21,6 +23,28 @@ Status guarded(Component* component, Status ok, Status failed, const Action& act
     component->log(true, error.what());
     return failed;
   }
+}
+
+/// The instance behind a tool's pointer.
+[[nodiscard]] inline Component* of(void* instance) noexcept { return static_cast<Component*>(instance); }
+
+/// Answers a function that these FMUs do not have.
+template <class Status>
+Status not_there(void* instance, Status failed, const char* function) noexcept {
+  if (instance != nullptr) of(instance)->log(true, std::string(function) + ": this FMU cannot do that");
+  return failed;
+}
+
+/// Gives a state to the tool, in the object that it has from a call before, or in a new one.
+inline void keep(State state, void*& kept) {
+  if (kept == nullptr) kept = new State;
+  *static_cast<State*>(kept) = std::move(state);
+}
+inline void write_bytes(const State& state, void* bytes, std::size_t size) {
+  const std::string made = to_bytes(state);
+  if (size < made.size())
+    throw std::invalid_argument("the serialised state needs " + std::to_string(made.size()) + " bytes");
+  std::memcpy(bytes, made.data(), made.size());
 }
 
 /// The variable's value of that type, or an exception that names both.

@@ -1,17 +1,57 @@
 // Plants side by side in lanes that pass the inputs of a recorded window.
 #pragma once
 
+#include <cstddef>
+
 #include "abs_hil/plant_sim/load_models.hpp"
 #include "abs_hil/plant_sim/tyre_models.hpp"
-#include "plant_sim/lanes/window_work.hpp"
 #include "plant_sim/runge_kutta.hpp"
+#include "rig/instruction_sets.hpp"
+#include "rig/pack.hpp"
 
 /// Calls `each(tyre, load)` for every combination that has lanes.
 #define ABS_HIL_WINDOW_KINDS(each)                                 \
   each(plant_sim::BasicMagicFormula, plant_sim::BasicConstantLoad) \
       each(plant_sim::BasicIntecoMu, plant_sim::BasicLeverLoad)
 
+/// Plants of other parameters or states that pass the same inputs side by side: what differences of simulations are
+/// made of. Compiled for each instruction set, as the lanes of a study are.
 namespace abs_hil::plant_sim::lanes {
+
+/// Inputs over one interval. A lane whose inputs come late has the earlier ones until then.
+struct Interval {
+  double duration_s{0.0};
+  double motor_duty{0.0};
+  double brake_duty{0.0};
+  double earlier_motor_duty{0.0};
+  double earlier_brake_duty{0.0};
+};
+
+/// One window and the plants that pass it. Lane n has column n of every array; each array has `lanes` columns.
+struct WindowWork {
+  double* const* plants{nullptr};  ///< words of a LanePlant<double>, at its start state; they stay as they are
+  std::size_t count{0};            ///< of plants: `lanes` at most
+  const Interval* intervals{nullptr};
+  std::size_t rows{0};
+  bool apart{false};        ///< the wheels do not touch
+  bool late{false};         ///< a lane's inputs come late
+  double* angles{nullptr};  ///< (rows, 2, lanes): upper and lower wheel at the start of each interval
+  double* ends{nullptr};    ///< (5, lanes): the states at the window's end, as StateVector
+};
+
+/// Integrates every plant over the window. False where a wheel stands or stops, which lanes cannot do: the arrays are
+/// wrong then. While the wheels are apart the upper one may stand from the start.
+struct WindowKernel {
+  bool (*pass)(const WindowWork& work) noexcept;
+  std::size_t lanes;
+};
+
+template <template <class> class Tyre, template <class> class Load>
+struct WindowKind;
+
+/// Defined in the sources that are compiled for `Isa` alone.
+template <class Isa, class Kind>
+WindowKernel window_kernel() noexcept;
 
 /// A plant without profiles and flaws, over a scalar. It has nothing but scalars as members, so that plant and lane
 /// have the same words (rig/pack.hpp).
@@ -94,5 +134,41 @@ class WindowPass {
 
   Plant plant_;
 };
+
+#ifdef ABS_HIL_LANE_ISA
+// The kernels of one instruction set. A source defines ABS_HIL_LANE_ISA and ABS_HIL_LANE_VECTORS and includes this; it
+// is compiled for that set alone, so it must define no function that other sources define too:
+// tests/study/lanes/symbols_test.py checks the names.
+template <class Isa, std::size_t Vectors, template <class> class Tyre, template <class> class Load>
+bool pass_window(const WindowWork& work) noexcept {
+  using S = rig::Pack<Isa, Vectors>;
+  using Plant = LanePlant<S, Tyre<S>, Load<S>>;
+  using One = LanePlant<double, Tyre<double>, Load<double>>;
+  static_assert(sizeof(Plant) == sizeof(One) * S::lanes, "plant and lane have the same words");
+  static_assert(std::is_trivially_copyable_v<Plant> && std::is_trivially_copyable_v<One>);
+  Plant plants;
+  for (std::size_t lane = 0; lane < S::lanes; ++lane)  // free lanes repeat the first plant
+    rig::put_lane<S>(plants, lane, work.plants[lane < work.count ? lane : 0]);
+  WindowPass<S, Tyre<S>, Load<S>> pass(plants);
+  constexpr std::size_t bytes = sizeof(S);
+  for (std::size_t row = 0; row < work.rows; ++row) {
+    double* const to = work.angles + 2 * row * S::lanes;
+    std::memcpy(to, &pass.x()[angle1], bytes);
+    std::memcpy(to + S::lanes, &pass.x()[angle2], bytes);
+    if (rig::any(pass.advance(work.intervals[row], work.apart, work.late))) return false;
+  }
+  for (std::size_t i = 0; i < pass.x().size(); ++i) std::memcpy(work.ends + i * S::lanes, &pass.x()[i], bytes);
+  return true;
+}
+
+#define ABS_HIL_WINDOW_KERNEL(tyre, load)                                                     \
+  template <>                                                                                 \
+  WindowKernel window_kernel<rig::ABS_HIL_LANE_ISA, WindowKind<tyre, load>>() noexcept {      \
+    using S = rig::Pack<rig::ABS_HIL_LANE_ISA, ABS_HIL_LANE_VECTORS>;                         \
+    return {&pass_window<rig::ABS_HIL_LANE_ISA, ABS_HIL_LANE_VECTORS, tyre, load>, S::lanes}; \
+  }
+ABS_HIL_WINDOW_KINDS(ABS_HIL_WINDOW_KERNEL)
+#undef ABS_HIL_WINDOW_KERNEL
+#endif
 
 }  // namespace abs_hil::plant_sim::lanes

@@ -189,40 +189,37 @@ struct BrakingCourse {
   }
   /// Gate and board, from the law's answer to the duty, and the figures of the cycle.
   [[gnu::noinline, gnu::flatten]] void send(const control::BasicSlipOutput<S>& output, bool estimates_theta,
-                                            const S& dt_s) noexcept;
+                                            const S& dt_s) noexcept {
+    // A controller's output must be finite, and what the gate sees too. Numbers that large are no part of a sound run.
+    constexpr double sound = 1e30;
+    const S theta_N = estimates_theta ? output.theta_est_N : S(0.0);
+    disturb(!(rig::magnitude(output.brake_torque_Nm) < sound &&
+              rig::magnitude(output.slip_velocity_error_m_s) < sound && rig::magnitude(theta_N) < sound &&
+              rig::magnitude(upper.omega_rad_s) <= gate.overspeed_rad_s &&
+              rig::magnitude(lower.omega_rad_s) <= gate.overspeed_rad_s));
+    const Condition braking = sequence.holds == 0.0;
+    const S wanted_Nm = rig::select(braking, output.brake_torque_Nm, sequence.hold_torque_Nm);
+    const auto target = actuator.next(wanted_Nm, dt_s);
+    analysis::BrakingSample<S> sample{.time_s = time_ns * rig::s_per_ns,
+                                      .v_x_m_s = rig.v_x_m_s(),
+                                      .slip = rig.slip(),
+                                      .slip_ref = rig::select(rig::is_nan(output.slip_ref), slip_ref, output.slip_ref),
+                                      .theta_est_N = output.theta_est_N,
+                                      .theta_N = rig.peak_force_N()};
+    sample.torque_ref_Nm = target.torque_Nm;
+    const S passed = gate.passed_duty(target.duty, dt_s);
+    duty = rig.sent_duty(passed);
+    gate.brake_risen = rig::smaller(passed, S(duty + runtime::rounded_down_most));
+    actuator.command(duty, target.torque_Nm);
+    sent_Nm = actuator.static_torque_Nm(duty, target.torque_Nm);
+    unsent_Nm = rig::select(braking, actuator.unsent_Nm(wanted_Nm, target.torque_Nm, sent_Nm), S(0.0));
+
+    distance.note(sample.time_s, sample.v_x_m_s, braking);
+    sample.distance_m = distance.distance_m();
+    figures.note(sample, braking);
+    complete = rig::select(!braking && figures.stop_known(), S(1.0), complete);
+  }
 };
-
-template <class S, template <class> class Tyre, template <class> class Load>
-void BrakingCourse<S, Tyre, Load>::send(const control::BasicSlipOutput<S>& output, bool estimates_theta,
-                                        const S& dt_s) noexcept {
-  // A controller's output must be finite, and what the gate sees too. Numbers that large are no part of a sound run.
-  constexpr double sound = 1e30;
-  const S theta_N = estimates_theta ? output.theta_est_N : S(0.0);
-  disturb(!(rig::magnitude(output.brake_torque_Nm) < sound && rig::magnitude(output.slip_velocity_error_m_s) < sound &&
-            rig::magnitude(theta_N) < sound && rig::magnitude(upper.omega_rad_s) <= gate.overspeed_rad_s &&
-            rig::magnitude(lower.omega_rad_s) <= gate.overspeed_rad_s));
-  const Condition braking = sequence.holds == 0.0;
-  const S wanted_Nm = rig::select(braking, output.brake_torque_Nm, sequence.hold_torque_Nm);
-  const auto target = actuator.next(wanted_Nm, dt_s);
-  analysis::BrakingSample<S> sample{.time_s = time_ns * rig::s_per_ns,
-                                    .v_x_m_s = rig.v_x_m_s(),
-                                    .slip = rig.slip(),
-                                    .slip_ref = rig::select(rig::is_nan(output.slip_ref), slip_ref, output.slip_ref),
-                                    .theta_est_N = output.theta_est_N,
-                                    .theta_N = rig.peak_force_N()};
-  sample.torque_ref_Nm = target.torque_Nm;
-  const S passed = gate.passed_duty(target.duty, dt_s);
-  duty = rig.sent_duty(passed);
-  gate.brake_risen = rig::smaller(passed, S(duty + runtime::rounded_down_most));
-  actuator.command(duty, target.torque_Nm);
-  sent_Nm = actuator.static_torque_Nm(duty, target.torque_Nm);
-  unsent_Nm = rig::select(braking, actuator.unsent_Nm(wanted_Nm, target.torque_Nm, sent_Nm), S(0.0));
-
-  distance.note(sample.time_s, sample.v_x_m_s, braking);
-  sample.distance_m = distance.distance_m();
-  figures.note(sample, braking);
-  complete = rig::select(!braking && figures.stop_known(), S(1.0), complete);
-}
 
 template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
 struct BrakingRun : BrakingCourse<S, Tyre, Load> {

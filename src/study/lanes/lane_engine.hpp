@@ -8,7 +8,6 @@
 
 #include "rig/pack.hpp"
 #include "study/lanes/braking_run.hpp"
-#include "study/lanes/lane_kernels.hpp"
 #include "study/lanes/lane_kinds.hpp"
 
 namespace abs_hil::study::lanes {

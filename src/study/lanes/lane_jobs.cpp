@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
@@ -127,19 +126,6 @@ struct Kind {
 
 namespace {
 
-template <class Model>
-std::optional<Model> model_of(const auto& models) {
-  const auto* model = std::get_if<Model>(&models);
-  return model == nullptr ? std::nullopt : std::optional<Model>(*model);
-}
-
-template <class Run>
-Run run_of(const double* words) {
-  Run run;
-  std::memcpy(static_cast<void*>(&run), words, sizeof(Run));
-  return run;
-}
-
 template <template <class> class Law, template <class> class Tyre, template <class> class Load>
 struct KindOf {
   using Run = BrakingRun<double, Law, Tyre, Load>;
@@ -151,11 +137,11 @@ struct KindOf {
     if constexpr (requires { controller->law().has_lanes(); }) {
       if (!controller->law().has_lanes()) return false;
     }
-    const auto tyre = model_of<Tyre<double>>(plant.tyre);
-    if (!tyre) return false;
-    const auto load =
-        model_of<Load<double>>(plant_sim::make_load_model(job.plant, tyre->peak_mu(), plant.friction_at_most));
-    if (!load) return false;
+    const auto* const tyre = std::get_if<Tyre<double>>(&plant.tyre);
+    if (tyre == nullptr) return false;
+    const auto loads = plant_sim::make_load_model(job.plant, tyre->peak_mu(), plant.friction_at_most);
+    const auto* const load = std::get_if<Load<double>>(&loads);
+    if (load == nullptr) return false;
     const rig::RigParameters& model = parts.settings.model;
     Run run;
     run.rig.tyre = *tyre;
@@ -190,7 +176,8 @@ struct KindOf {
     return true;
   }
   static bool result(const double* words, RunResult& result) {
-    const Run run = run_of<Run>(words);
+    Run run;
+    std::memcpy(static_cast<void*>(&run), words, sizeof(Run));
     if (run.disturbed != 0.0) return false;
     result = {.metrics = analysis::metrics_of(run.figures)};
     return true;
@@ -245,6 +232,22 @@ bool flawed(const plant_sim::PlantOptions& plant) {
          eccentric(plant.rig) || plant.encoder_eccentricity_rad > 0.0 ||
          plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
          plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
+}
+
+/// Integrates the plant over a cycle that lanes cannot compute.
+void assist(void* runs, const AssistedCycle& cycle, double* state, double* conditions) {
+  Started& run = static_cast<Started*>(runs)[cycle.run];
+  if (!run.plant) run.plant = started_plant(run.job.plant);
+  const auto cycles = std::llround(cycle.time_ns * rig::s_per_ns / cycle.duration_s);
+  plant_sim::StateVector x{};
+  std::copy_n(state, x.size(), x.begin());
+  run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
+  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty, .brake_torque_Nm = cycle.brake_torque_Nm});
+  run.plant_cycles = cycles;
+  x = plant_sim::vector_of(run.plant->state());
+  std::copy(x.begin(), x.end(), state);
+  const LaneConditions<double> now = lane_conditions(run.plant->conditions(), cycle.time_ns);
+  std::memcpy(conditions, &now, sizeof(now));
 }
 
 }  // namespace
@@ -329,26 +332,6 @@ const Kind* LaneSettings::begin(Started& run) const {
   }
   return nullptr;
 }
-
-namespace {
-
-/// Integrates the plant over a cycle that lanes cannot compute.
-void assist(void* runs, const AssistedCycle& cycle, double* state, double* conditions) {
-  Started& run = static_cast<Started*>(runs)[cycle.run];
-  if (!run.plant) run.plant = started_plant(run.job.plant);
-  const auto cycles = std::llround(cycle.time_ns * rig::s_per_ns / cycle.duration_s);
-  plant_sim::StateVector x{};
-  std::copy_n(state, x.size(), x.begin());
-  run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
-  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty, .brake_torque_Nm = cycle.brake_torque_Nm});
-  run.plant_cycles = cycles;
-  x = plant_sim::vector_of(run.plant->state());
-  std::copy(x.begin(), x.end(), state);
-  const LaneConditions<double> now = lane_conditions(run.plant->conditions(), cycle.time_ns);
-  std::memcpy(conditions, &now, sizeof(now));
-}
-
-}  // namespace
 
 void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::uint32_t window_cycles) {
   std::vector<double*> words;

@@ -9,7 +9,6 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "study/batch.hpp"
-#include "study/lanes/lane_kernels.hpp"
 
 namespace abs_hil::study::lanes {
 
