@@ -39,7 +39,7 @@ py::dict experiments() {
   return all;
 }
 
-py::object value_of(const config::Key& key) {
+py::object python_value(const config::Key& key) {
   return std::visit([](const auto* target) { return py::cast(*target); }, key.target);
 }
 
@@ -53,7 +53,7 @@ py::list keys(const py::dict& arguments) {
     row["name"] = key.name;
     row["unit"] = std::string(key.unit);
     row["meaning"] = std::string(key.meaning);
-    row["value"] = value_of(key);
+    row["value"] = python_value(key);
     if (key.search.given()) {
       row["search"] = py::make_tuple(key.search.least, key.search.most, key.search.logarithmic);
     }

@@ -162,12 +162,12 @@ fs::path named_file(fs::path (*folder)(), std::string_view what, std::string_vie
   fs::path named = folder() / fmt::format("{}.toml", name_or_file);
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
   const std::vector<std::string> known = names_in(folder());
-  throw ConfigError(fmt::format("{}: unknown {} \"{}\"{}; known: {}; or give a TOML file", option, what, name_or_file,
+  throw ConfigError(fmt::format("{}: {} \"{}\"{}; known: {}; or give a TOML file", option, what, name_or_file,
                                 rig::nearest_hint(name_or_file, known), fmt::join(known, ", ")));
 }
 
 fs::path plant_file(std::string_view name_or_file, std::string_view option) {
-  return named_file(&plants_dir, "plant", name_or_file, option);
+  return named_file(&plants_dir, "unknown plant", name_or_file, option);
 }
 
 std::string model_origin(const Settings& settings, std::chrono::sys_days today) {

@@ -52,7 +52,7 @@ void set_own_config_dir(std::filesystem::path folder);
 
 /// A TOML file: itself if it is a path or ends in .toml, else that of the name in the folder. Throws ConfigError,
 /// naming `option` and the known ones.
-/// @param what  "plant"
+/// @param what  of a name that is not known: "unknown plant"
 [[nodiscard]] std::filesystem::path named_file(std::filesystem::path (*folder)(), std::string_view what,
                                                std::string_view name_or_file, std::string_view option);
 

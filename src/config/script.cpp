@@ -321,7 +321,7 @@ Script load(const std::string& path) {
 std::shared_ptr<const Script> find(const std::string& name_or_file) {
   static std::mutex mutex;
   static std::map<std::string, std::shared_ptr<const Script>> read;
-  const std::string file = named_file(&experiments_dir, "experiment", name_or_file, "--experiment").string();
+  const std::string file = named_file(&experiments_dir, "unknown experiment", name_or_file, "--experiment").string();
   const std::scoped_lock lock(mutex);
   std::shared_ptr<const Script>& script = read[file];
   if (!script) {
