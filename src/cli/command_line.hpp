@@ -43,17 +43,17 @@ struct Count {
 
 /// What more there is to say of an option.
 struct Option {
-  bool sets{true};                                   ///< the value that a flag gives its target
-  std::string type{};                                ///< name of the value in the help; empty: that of its type
-  Range range{};                                     ///< of integers unless the target is a double
-  std::vector<std::string> one_of{};                 ///< valid values; empty: any
-  Count count{};                                     ///< of values
-  bool repeated{false};                              ///< takes one value each time; without it, all that follow
-  bool required{false};                              ///< the command line must have it
-  bool show_default{false};                          ///< the help shows the target's value at this moment
-  std::string default_text{};                        ///< the help shows this as the default
-  std::vector<std::string> needs{};                  ///< names of options that must be given with it
-  std::vector<std::string> excludes{};               ///< names of options that must not
+  bool sets{true};                      ///< the value that a flag gives its target
+  std::string type{};                   ///< name of the value in the help; empty: that of its type
+  Range range{};                        ///< of integers unless the target is a double
+  std::vector<std::string> one_of{};    ///< valid values; empty: any
+  Count count{};                        ///< of values
+  bool repeated{false};                 ///< takes one value each time; without it, all that follow
+  bool required{false};                 ///< the command line must have it
+  bool show_default{false};             ///< the help shows the target's value at this moment
+  std::string default_text{};           ///< the help shows this as the default
+  std::vector<std::string> needs{};     ///< names of options that must be given with it
+  std::vector<std::string> excludes{};  ///< names of options that must not
 };
 
 /// What a program, a subcommand or a group of options reads from a command line. A copy is the same parser.

@@ -1,7 +1,5 @@
 // Facts about interfaces from the kernel's messages, which are built here after linux/rtnetlink.h and linux/if_link.h.
 
-#include "driver/can/bus.hpp"
-
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
@@ -13,6 +11,7 @@
 #include <utility>
 
 #include "catch.hpp"
+#include "driver/can/bus.hpp"
 
 using namespace abs_hil::driver::can;
 
