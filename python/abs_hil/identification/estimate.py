@@ -25,6 +25,8 @@ FASTEST_RAD_S = 2000.0
 LARGEST_LAST_STEP = 5.0
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
 LARGEST_WANDER = 0.1
+#: what acts there and does not fit leaves the form of the tyre open
+AT_THE_CONTACT = ('road', 'r1_m')
 
 
 def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-table1', *,
@@ -96,7 +98,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         causes = finished.causes or finished.hidden
         off = (causes[0].cause.acts if causes else
                DISTURBANCES[int(np.argmax(finished.disturbances.sd[:3]))] if finished.disturbances is not None else '')
-        refuse(found, why, of_logs, not decided or (form == 'auto' and off == 'road'))
+        refuse(found, why, of_logs, not decided or (form == 'auto' and off in AT_THE_CONTACT))
     elif not decided:
         leave_form_open(found)
     return found
