@@ -167,18 +167,7 @@ class BrakingFigures : public FiguresOf<S> {
 
   /// @param braking  the cycle is in phase brake; it is in the first one
   template <class Condition>
-  void note(const BrakingSample<S>& sample, const Condition& braking) noexcept {
-    brake_start_s = rig::select(rig::is_nan(brake_start_s), sample.time_s, brake_start_s);
-    const S since_brake_s = sample.time_s - brake_start_s;
-    final_speed_m_s = sample.v_x_m_s;
-    last_distance_m = sample.distance_m;
-    note_deceleration(sample.time_s, sample.v_x_m_s);
-    if (rig::any(braking)) note_braking(sample, braking, since_brake_s);
-    last_time_s = sample.time_s;
-    const auto stops = !stop_known() && since_brake_s > 0.0 && sample.v_x_m_s < end_speed_m_s_;
-    stop_time_s = rig::select(stops, since_brake_s, stop_time_s);
-    stop_distance_m = rig::select(stops, sample.distance_m, stop_distance_m);
-  }
+  void note(const BrakingSample<S>& sample, const Condition& braking) noexcept;
 
   [[nodiscard]] auto stop_known() const noexcept { return !rig::is_nan(stop_time_s); }
   [[nodiscard]] S end_speed_m_s() const noexcept { return end_speed_m_s_; }
@@ -194,57 +183,80 @@ class BrakingFigures : public FiguresOf<S> {
 
  private:
   template <class Condition>
-  void note_braking(const BrakingSample<S>& sample, const Condition& braking, const S& since_brake_s) noexcept {
-    // A wheel below a twentieth of the car's speed can be steered no better than a locked one.
-    constexpr double locked_slip = 0.95;
-
-    const S step_Nm = rig::magnitude(S(sample.torque_ref_Nm - last_torque_Nm_));
-    const auto begins = braking && rig::is_nan(torque_total_variation_Nm) && !rig::is_nan(sample.torque_ref_Nm);
-    const S before_Nm = rig::select(begins, S(0.0), torque_total_variation_Nm);
-    torque_total_variation_Nm = rig::select(braking && !rig::is_nan(step_Nm), S(before_Nm + step_Nm), before_Nm);
-    last_torque_Nm_ = rig::select(braking, sample.torque_ref_Nm, last_torque_Nm_);
-    // Slower than this the slip dynamics stiffen as 1 / v_x and the paper calls the performance "no longer relevant".
-    const auto judged = braking && sample.v_x_m_s > least_judged_speed_m_s;
-    if (!rig::any(judged)) return;
-
-    const S slip_error = sample.slip - sample.slip_ref;
-    const S over = rig::select(slip_error > 0.0, slip_error, S(0.0));
-    const auto further = judged && (rig::is_nan(slip_overshoot) || slip_overshoot < over);
-    slip_overshoot = rig::select(further, over, slip_overshoot);
-    const auto largest = judged && (rig::is_nan(slip_largest) || slip_largest < sample.slip);
-    slip_largest = rig::select(largest, sample.slip, slip_largest);
-    time_locked_s = rig::select(judged && rig::is_nan(time_locked_s), S(0.0), time_locked_s);
-    const auto locked = judged && sample.slip > locked_slip && !rig::is_nan(last_time_s);
-    time_locked_s = rig::select(locked, S(time_locked_s + (sample.time_s - last_time_s)), time_locked_s);
-    const auto in_band = rig::magnitude(slip_error) <= slip_band;
-    slip_reached_s = rig::select(judged && in_band && rig::is_nan(slip_reached_s), since_brake_s, slip_reached_s);
-    slip_settling.observe(judged, since_brake_s, in_band);
-    theta_final_N = rig::select(judged, sample.theta_est_N, theta_final_N);
-    const S theta_relative = sample.theta_est_N / sample.theta_N - 1.0;
-    theta_error_final = rig::select(judged, theta_relative, theta_error_final);
-    const auto counted = judged && since_brake_s > rms_start_s;
-    slip_square_sum = rig::select(counted, S(slip_square_sum + slip_error * slip_error), slip_square_sum);
-    theta_square_sum = rig::select(counted, S(theta_square_sum + theta_relative * theta_relative), theta_square_sum);
-    samples = rig::select(counted, S(samples + 1.0), samples);
-    const S theta_error_N = rig::magnitude(S(sample.theta_est_N - sample.theta_N));
-    const auto worse = counted && (rig::is_nan(theta_error_max_N) || theta_error_max_N < theta_error_N);
-    theta_error_max_N = rig::select(worse, theta_error_N, theta_error_max_N);
-    theta_settling.observe(judged, since_brake_s, theta_error_N <= theta_band * sample.theta_N);
-  }
-  void note_deceleration(const S& time_s, const S& v_x_m_s) noexcept {
-    constexpr double interval_s = 0.01;
-    const auto over = !(time_s - interval_start_s_ < interval_s);
-    if (!rig::any(over)) return;
-    const S deceleration = (interval_start_m_s_ - v_x_m_s) / (time_s - interval_start_s_);
-    deceleration_m_s2 = rig::select(over && !rig::is_nan(interval_start_s_), deceleration, deceleration_m_s2);
-    interval_start_s_ = rig::select(over, time_s, interval_start_s_);
-    interval_start_m_s_ = rig::select(over, v_x_m_s, interval_start_m_s_);
-  }
+  void note_braking(const BrakingSample<S>& sample, const Condition& braking, const S& since_brake_s) noexcept;
+  void note_deceleration(const S& time_s, const S& v_x_m_s) noexcept;
 
   S end_speed_m_s_{0.0};
   S interval_start_s_{rig::unknown};
   S interval_start_m_s_{0.0};
   S last_torque_Nm_{rig::unknown};
 };
+
+template <class S>
+template <class Condition>
+void BrakingFigures<S>::note(const BrakingSample<S>& sample, const Condition& braking) noexcept {
+  brake_start_s = rig::select(rig::is_nan(brake_start_s), sample.time_s, brake_start_s);
+  const S since_brake_s = sample.time_s - brake_start_s;
+  final_speed_m_s = sample.v_x_m_s;
+  last_distance_m = sample.distance_m;
+  note_deceleration(sample.time_s, sample.v_x_m_s);
+  if (rig::any(braking)) note_braking(sample, braking, since_brake_s);
+  last_time_s = sample.time_s;
+  const auto stops = !stop_known() && since_brake_s > 0.0 && sample.v_x_m_s < end_speed_m_s_;
+  stop_time_s = rig::select(stops, since_brake_s, stop_time_s);
+  stop_distance_m = rig::select(stops, sample.distance_m, stop_distance_m);
+}
+
+template <class S>
+template <class Condition>
+void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condition& braking,
+                                     const S& since_brake_s) noexcept {
+  // A wheel below a twentieth of the car's speed can be steered no better than a locked one.
+  constexpr double locked_slip = 0.95;
+
+  const S step_Nm = rig::magnitude(S(sample.torque_ref_Nm - last_torque_Nm_));
+  const auto begins = braking && rig::is_nan(torque_total_variation_Nm) && !rig::is_nan(sample.torque_ref_Nm);
+  const S before_Nm = rig::select(begins, S(0.0), torque_total_variation_Nm);
+  torque_total_variation_Nm = rig::select(braking && !rig::is_nan(step_Nm), S(before_Nm + step_Nm), before_Nm);
+  last_torque_Nm_ = rig::select(braking, sample.torque_ref_Nm, last_torque_Nm_);
+  // Slower than this the slip dynamics stiffen as 1 / v_x and the paper calls the performance "no longer relevant".
+  const auto judged = braking && sample.v_x_m_s > least_judged_speed_m_s;
+  if (!rig::any(judged)) return;
+
+  const S slip_error = sample.slip - sample.slip_ref;
+  const S over = rig::select(slip_error > 0.0, slip_error, S(0.0));
+  const auto further = judged && (rig::is_nan(slip_overshoot) || slip_overshoot < over);
+  slip_overshoot = rig::select(further, over, slip_overshoot);
+  const auto largest = judged && (rig::is_nan(slip_largest) || slip_largest < sample.slip);
+  slip_largest = rig::select(largest, sample.slip, slip_largest);
+  time_locked_s = rig::select(judged && rig::is_nan(time_locked_s), S(0.0), time_locked_s);
+  const auto locked = judged && sample.slip > locked_slip && !rig::is_nan(last_time_s);
+  time_locked_s = rig::select(locked, S(time_locked_s + (sample.time_s - last_time_s)), time_locked_s);
+  const auto in_band = rig::magnitude(slip_error) <= slip_band;
+  slip_reached_s = rig::select(judged && in_band && rig::is_nan(slip_reached_s), since_brake_s, slip_reached_s);
+  slip_settling.observe(judged, since_brake_s, in_band);
+  theta_final_N = rig::select(judged, sample.theta_est_N, theta_final_N);
+  const S theta_relative = sample.theta_est_N / sample.theta_N - 1.0;
+  theta_error_final = rig::select(judged, theta_relative, theta_error_final);
+  const auto counted = judged && since_brake_s > rms_start_s;
+  slip_square_sum = rig::select(counted, S(slip_square_sum + slip_error * slip_error), slip_square_sum);
+  theta_square_sum = rig::select(counted, S(theta_square_sum + theta_relative * theta_relative), theta_square_sum);
+  samples = rig::select(counted, S(samples + 1.0), samples);
+  const S theta_error_N = rig::magnitude(S(sample.theta_est_N - sample.theta_N));
+  const auto worse = counted && (rig::is_nan(theta_error_max_N) || theta_error_max_N < theta_error_N);
+  theta_error_max_N = rig::select(worse, theta_error_N, theta_error_max_N);
+  theta_settling.observe(judged, since_brake_s, theta_error_N <= theta_band * sample.theta_N);
+}
+
+template <class S>
+void BrakingFigures<S>::note_deceleration(const S& time_s, const S& v_x_m_s) noexcept {
+  constexpr double interval_s = 0.01;
+  const auto over = !(time_s - interval_start_s_ < interval_s);
+  if (!rig::any(over)) return;
+  const S deceleration = (interval_start_m_s_ - v_x_m_s) / (time_s - interval_start_s_);
+  deceleration_m_s2 = rig::select(over && !rig::is_nan(interval_start_s_), deceleration, deceleration_m_s2);
+  interval_start_s_ = rig::select(over, time_s, interval_start_s_);
+  interval_start_m_s_ = rig::select(over, v_x_m_s, interval_start_m_s_);
+}
 
 }  // namespace abs_hil::analysis

@@ -28,102 +28,19 @@ class AdaptiveActuatorLaw {
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
   explicit AdaptiveActuatorLaw(const ControllerContext& context);
 
-  void reset(const BasicSlipInput<S>& input) noexcept {
-    integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
-    theta_.reset();
-    wheels_observer_.reset(input.speeds);
-    omega1_rad_s_ = input.speeds.omega1_rad_s;
-    slip_ = input.slip;
-    tuning_ = S(0.0);
-  }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept {
-    const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
-    limited_ = rig::select(lags && raw.unsent_torque_Nm != 0.0, S(1.0), S(0.0));
-    if (rig::any(lags)) wheels_observer_.update(raw);
-    const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
-    const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
-    integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
-    const S past_phi = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
-    adapt(input, past_phi, lags);
-
-    S torque_Nm =
-        dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
-    if (rig::any(lags)) torque_Nm = rig::select(lags, through_lag(input, torque_Nm, error_m_s), torque_Nm);
-    return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
-  }
-  void take_over(const AdaptiveActuatorLaw& before) noexcept {
-    integral_ = before.integral_;
-    theta_.take_over(before.theta_);
-    wheels_observer_.take_over(before.wheels_observer_);
-    omega1_rad_s_ = before.omega1_rad_s_;
-    slip_ = before.slip_;
-    tuning_ = before.tuning_;
-  }
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept;
+  void take_over(const AdaptiveActuatorLaw& before) noexcept;
 
  private:
   [[nodiscard]] S gain(const S& slip) const noexcept { return laws_.k({.lambda_ref = slip}); }
   template <class Condition>
-  void adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept {
-    const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
-    const S zeta_rate = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x);
-    if (rig::any(lags)) {
-      const auto known = turns(omega1_rad_s_) && turns(input.speeds.omega1_rad_s) && input.dt_s > 0.0;
-      theta_.update_where(known, {.dt_s = input.dt_s,
-                                  .tyre_force_N = wheels_observer_.force_N(),
-                                  .phi = past_phi,
-                                  .zeta_rate_N_s = zeta_rate});
-    } else {
-      theta_.update(BasicAdaptationInterval<S>{.dt_s = input.dt_s,
-                                               .omega1_before_rad_s = omega1_rad_s_,
-                                               .omega1_after_rad_s = input.speeds.omega1_rad_s,
-                                               .brake_torque_Nm = input.mean_brake_torque_Nm,
-                                               .phi = past_phi,
-                                               .zeta_rate_N_s = zeta_rate});
-    }
-    omega1_rad_s_ = input.speeds.omega1_rad_s;
-    slip_ = input.slip;
-  }
-  /// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ); 0 while the command is limited.
-  [[nodiscard]] S zeta_rate_N_s(const S& slip_ref, const S& phi, const S& BtP_x) const noexcept {
-    return rig::select(limited_ > 0.0, S(0.0), S(-gains_.gamma * phi * (gain(slip_ref) * BtP_x + tuning_)));
-  }
-  [[nodiscard]] S through_lag(const BasicSlipInput<S>& input, const S& wanted_Nm, const S& error_m_s) noexcept {
-    const S arm = laws_.J1 / laws_.r1;
-    const S eta = (input.brake_torque_Nm - wanted_Nm) / arm;
-    const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.value_m(), error_m_s);
-    const S phi = rig::larger(S(0.0), rig::normalised_tyre_force(tyre_, input.slip));
-
-    tuning_ = lag_weight_ * wanted_rate_per_theta(input) * eta;
-    const S zeta_rate = zeta_rate_N_s(input.slip_ref, phi, BtP_x);
-    const S eta_rate = lag_decay_per_s_ * eta - BtP_x / lag_weight_;
-    const S torque_rate_Nm_s = arm * (wanted_rate_m_s3(input, error_m_s, zeta_rate) + eta_rate);
-    return lag_.command_Nm(input.brake_torque_Nm, S(period_s_ * torque_rate_Nm_s));
-  }
-  /// (r1/J1) alpha' of (17) by the model at theta_hat. `zeta_rate` is the part of theta_hat' that is known now.
+  void adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept;
+  [[nodiscard]] S zeta_rate_N_s(const S& slip_ref, const S& phi, const S& BtP_x) const noexcept;
+  [[nodiscard]] S through_lag(const BasicSlipInput<S>& input, const S& wanted_Nm, const S& error_m_s) noexcept;
   [[nodiscard]] S wanted_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s,
-                                   const S& zeta_rate) const noexcept {
-    const S phi = rig::normalised_tyre_force(tyre_, input.slip);
-    const S k = gain(input.slip_ref);
-    const WheelMotion<S> motion =
-        wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
-                     {.tyre_force_N = theta_.theta_N() * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
-    return paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2) + k * phi * zeta_rate +
-           k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
-           motion.drift_rate_m_s3;
-  }
-  /// Effect on it of each newton of phi (theta - theta_hat), which the model does not know: the factor a of the header.
-  [[nodiscard]] S wanted_rate_per_theta(const BasicSlipInput<S>& input) const noexcept {
-    const auto& w = laws_;
-    const S k = gain(input.slip_ref);
-    const S phi = rig::larger(S(0.0), rig::normalised_tyre_force(tyre_, input.slip));
-    const S v_x = rig::larger(S(w.r2 * input.speeds.omega2_rad_s), v_min_m_s_);
-    const S slip_rate = -gain(input.slip) / v_x;
-    const S upper = w.r1 / w.J1;
-    const S lower = w.r2 / w.J2;
-    const S drift_rate = -upper * upper * w.d1 - (1.0 - input.slip_ref) * lower * lower * w.d2;
-    return gains_.ks1 * k + k * phi * gains_.gamma * gains_.ka1 +
-           k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * slip_rate + drift_rate;
-  }
+                                   const S& zeta_rate) const noexcept;
+  [[nodiscard]] S wanted_rate_per_theta(const BasicSlipInput<S>& input) const noexcept;
 
   paper::Laws<S> laws_{};
   rig::TyreShape<S> tyre_{};
@@ -142,5 +59,113 @@ class AdaptiveActuatorLaw {
   S tuning_{0.0};   ///< lag_weight a eta of the previous cycle
   S limited_{0.0};  ///< 1 if the previous command was not sent as it was, else 0
 };
+
+template <class S>
+void AdaptiveActuatorLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
+  theta_.reset();
+  wheels_observer_.reset(input.speeds);
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+  tuning_ = S(0.0);
+}
+
+template <class S>
+BasicSlipOutput<S> AdaptiveActuatorLaw<S>::step(const BasicSlipInput<S>& raw) noexcept {
+  const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
+  limited_ = rig::select(lags && raw.unsent_torque_Nm != 0.0, S(1.0), S(0.0));
+  if (rig::any(lags)) wheels_observer_.update(raw);
+  const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
+  const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+  integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
+  const S past_phi = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
+  adapt(input, past_phi, lags);
+
+  S torque_Nm =
+      dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
+  if (rig::any(lags)) torque_Nm = rig::select(lags, through_lag(input, torque_Nm, error_m_s), torque_Nm);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
+
+/// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ); 0 while the command is limited.
+template <class S>
+S AdaptiveActuatorLaw<S>::zeta_rate_N_s(const S& slip_ref, const S& phi, const S& BtP_x) const noexcept {
+  return rig::select(limited_ > 0.0, S(0.0), S(-gains_.gamma * phi * (gain(slip_ref) * BtP_x + tuning_)));
+}
+
+template <class S>
+template <class Condition>
+void AdaptiveActuatorLaw<S>::adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept {
+  const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
+  const S zeta_rate = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x);
+  if (rig::any(lags)) {
+    const auto known = turns(omega1_rad_s_) && turns(input.speeds.omega1_rad_s) && input.dt_s > 0.0;
+    theta_.update_where(
+        known,
+        {.dt_s = input.dt_s, .tyre_force_N = wheels_observer_.force_N(), .phi = past_phi, .zeta_rate_N_s = zeta_rate});
+  } else {
+    theta_.update(BasicAdaptationInterval<S>{.dt_s = input.dt_s,
+                                             .omega1_before_rad_s = omega1_rad_s_,
+                                             .omega1_after_rad_s = input.speeds.omega1_rad_s,
+                                             .brake_torque_Nm = input.mean_brake_torque_Nm,
+                                             .phi = past_phi,
+                                             .zeta_rate_N_s = zeta_rate});
+  }
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+}
+
+/// (r1/J1) alpha' of (17) by the model at theta_hat. `zeta_rate` is the part of theta_hat' that is known now.
+template <class S>
+S AdaptiveActuatorLaw<S>::wanted_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s,
+                                           const S& zeta_rate) const noexcept {
+  const S phi = rig::normalised_tyre_force(tyre_, input.slip);
+  const S k = gain(input.slip_ref);
+  const WheelMotion<S> motion =
+      wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
+                   {.tyre_force_N = theta_.theta_N() * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
+  return paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2) + k * phi * zeta_rate +
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
+         motion.drift_rate_m_s3;
+}
+
+/// Effect on it of each newton of phi (theta - theta_hat), which the model does not know: the factor a of the header.
+template <class S>
+S AdaptiveActuatorLaw<S>::wanted_rate_per_theta(const BasicSlipInput<S>& input) const noexcept {
+  const auto& w = laws_;
+  const S k = gain(input.slip_ref);
+  const S phi = rig::larger(S(0.0), rig::normalised_tyre_force(tyre_, input.slip));
+  const S v_x = rig::larger(S(w.r2 * input.speeds.omega2_rad_s), v_min_m_s_);
+  const S slip_rate = -gain(input.slip) / v_x;
+  const S upper = w.r1 / w.J1;
+  const S lower = w.r2 / w.J2;
+  const S drift_rate = -upper * upper * w.d1 - (1.0 - input.slip_ref) * lower * lower * w.d2;
+  return gains_.ks1 * k + k * phi * gains_.gamma * gains_.ka1 +
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * slip_rate + drift_rate;
+}
+
+template <class S>
+S AdaptiveActuatorLaw<S>::through_lag(const BasicSlipInput<S>& input, const S& wanted_Nm, const S& error_m_s) noexcept {
+  const S arm = laws_.J1 / laws_.r1;
+  const S eta = (input.brake_torque_Nm - wanted_Nm) / arm;
+  const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.value_m(), error_m_s);
+  const S phi = rig::larger(S(0.0), rig::normalised_tyre_force(tyre_, input.slip));
+
+  tuning_ = lag_weight_ * wanted_rate_per_theta(input) * eta;
+  const S zeta_rate = zeta_rate_N_s(input.slip_ref, phi, BtP_x);
+  const S eta_rate = lag_decay_per_s_ * eta - BtP_x / lag_weight_;
+  const S torque_rate_Nm_s = arm * (wanted_rate_m_s3(input, error_m_s, zeta_rate) + eta_rate);
+  return lag_.command_Nm(input.brake_torque_Nm, S(period_s_ * torque_rate_Nm_s));
+}
+
+template <class S>
+void AdaptiveActuatorLaw<S>::take_over(const AdaptiveActuatorLaw& before) noexcept {
+  integral_ = before.integral_;
+  theta_.take_over(before.theta_);
+  wheels_observer_.take_over(before.wheels_observer_);
+  omega1_rad_s_ = before.omega1_rad_s_;
+  slip_ = before.slip_;
+  tuning_ = before.tuning_;
+}
 
 }  // namespace abs_hil::control

@@ -24,30 +24,9 @@ class AdaptiveLaw {
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
   explicit AdaptiveLaw(const ControllerContext& context);
 
-  void reset(const BasicSlipInput<S>& input) noexcept {
-    integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
-    theta_.reset();
-    omega1_rad_s_ = input.speeds.omega1_rad_s;
-    slip_ = input.slip;
-  }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
-    const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
-    integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
-    // phi at the mean of the two slips has half the error of the trapezoidal rule where the curvature of phi is
-    // largest.
-    past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
-    adapt(input);
-
-    const S torque_Nm =
-        dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi_);
-    return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
-  }
-  void take_over(const AdaptiveLaw& before) noexcept {
-    integral_ = before.integral_;
-    theta_.take_over(before.theta_);
-    omega1_rad_s_ = before.omega1_rad_s_;
-    slip_ = before.slip_;
-  }
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
+  void take_over(const AdaptiveLaw& before) noexcept;
   /// The states of (17), and V and V' of Theorem 3.1. V needs the true theta: these take the model's, so V falls as the
   /// theorem says only if the model's theta is right.
   static constexpr std::array<rig::Signal, 5> signals{{
@@ -60,17 +39,7 @@ class AdaptiveLaw {
   void show(SlipOutput& output) const noexcept;
 
  private:
-  void adapt(const BasicSlipInput<S>& input) noexcept {
-    const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
-    theta_.update({.dt_s = input.dt_s,
-                   .omega1_before_rad_s = omega1_rad_s_,
-                   .omega1_after_rad_s = input.speeds.omega1_rad_s,
-                   .brake_torque_Nm = input.mean_brake_torque_Nm,
-                   .phi = past_phi_,
-                   .zeta_rate_N_s = laws_.zeta_dot(gains_, {.lambda_ref = input.slip_ref, .phi = past_phi_}, BtP_x)});
-    omega1_rad_s_ = input.speeds.omega1_rad_s;
-    slip_ = input.slip;
-  }
+  void adapt(const BasicSlipInput<S>& input) noexcept;
 
   paper::Laws<S> laws_{};
   rig::TyreShape<S> tyre_{};
@@ -84,5 +53,47 @@ class AdaptiveLaw {
   S slip_{0.0};
   S past_phi_{0.0};
 };
+
+template <class S>
+void AdaptiveLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
+  theta_.reset();
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+}
+
+template <class S>
+BasicSlipOutput<S> AdaptiveLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+  integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
+  // phi at the mean of the two slips has half the error of the trapezoidal rule where the curvature of phi is largest.
+  past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
+  adapt(input);
+
+  const S torque_Nm =
+      dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi_);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
+
+template <class S>
+void AdaptiveLaw<S>::adapt(const BasicSlipInput<S>& input) noexcept {
+  const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
+  theta_.update({.dt_s = input.dt_s,
+                 .omega1_before_rad_s = omega1_rad_s_,
+                 .omega1_after_rad_s = input.speeds.omega1_rad_s,
+                 .brake_torque_Nm = input.mean_brake_torque_Nm,
+                 .phi = past_phi_,
+                 .zeta_rate_N_s = laws_.zeta_dot(gains_, {.lambda_ref = input.slip_ref, .phi = past_phi_}, BtP_x)});
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+}
+
+template <class S>
+void AdaptiveLaw<S>::take_over(const AdaptiveLaw& before) noexcept {
+  integral_ = before.integral_;
+  theta_.take_over(before.theta_);
+  omega1_rad_s_ = before.omega1_rad_s_;
+  slip_ = before.slip_;
+}
 
 }  // namespace abs_hil::control

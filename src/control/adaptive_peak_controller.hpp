@@ -25,29 +25,8 @@ class AdaptivePeakLaw {
   /// Throws std::invalid_argument for options out of range.
   explicit AdaptivePeakLaw(const ControllerContext& context);
 
-  void reset(const BasicSlipInput<S>& input) noexcept {
-    observer_.reset(input.speeds);
-    peak_.reset();
-    centre_ = options_.slip_start;
-    integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, centre_), centre_);
-    search_angle_rad_ = S(0.0);
-    half_late_slip_ = late_slip_ = S(0.0);
-  }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
-    observer_.update(input);
-    const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
-    const S v_x = laws_.r2 * speeds.omega2_rad_s;
-    const S slip = rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), v_x, v_min_m_s_);
-    learn(input.dt_s, slip);
-    const Reference reference = next_reference(input.dt_s);
-
-    const S error_m_s = slip_velocity_error_m_s(laws_, speeds, reference.slip);
-    integral_.advance(input, error_m_s, reference.slip, v_x);
-    return {.brake_torque_Nm = command_Nm(input, slip, reference, error_m_s),
-            .slip_velocity_error_m_s = error_m_s,
-            .theta_est_N = peak_.peak_force_N(),
-            .slip_ref = reference.slip};
-  }
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
 
  private:
   /// The slip reference now, and its rate.
@@ -56,51 +35,10 @@ class AdaptivePeakLaw {
     S rate_per_s;
   };
 
-  void learn(const S& dt_s, const S& slip) noexcept {
-    if (!rig::any(dt_s > 0.0)) return;
-    const S covered = -rig::exponential_less_one(S(-2.0 * dt_s / observer_.force_delay_s()));
-    half_late_slip_ += covered * (slip - half_late_slip_);
-    late_slip_ += covered * (half_late_slip_ - late_slip_);
-    peak_.update(dt_s, late_slip_, observer_.force_N());
-  }
-  [[nodiscard]] Reference next_reference(const S& dt_s) noexcept {
-    const S target = rig::clamped(peak_.peak_slip(), options_.slip_min, options_.slip_max);
-    const S most = options_.slip_rate_per_s * dt_s;
-    const S step = rig::clamped(S(target - centre_), S(-most), most);
-    centre_ += step;
-    search_angle_rad_ = within_half_turn_rad(S(search_angle_rad_ + options_.search_rad_s * dt_s));
-    const S swing = rig::larger(S(options_.search_part * centre_), options_.search_min);
-    return {.slip = centre_ + swing * rig::sine(search_angle_rad_),
-            .rate_per_s = rig::select(dt_s > 0.0, S(step / dt_s), S(0.0)) +
-                          swing * options_.search_rad_s * rig::cosine(search_angle_rad_)};
-  }
+  void learn(const S& dt_s, const S& slip) noexcept;
+  [[nodiscard]] Reference next_reference(const S& dt_s) noexcept;
   [[nodiscard]] S command_Nm(const BasicSlipInput<S>& input, const S& slip, const Reference& reference,
-                             const S& error_m_s) const noexcept {
-    const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
-    const S v_x = rig::larger(S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
-    // The observed force replaces theta phi: theta is the force, and phi is 1.
-    const paper::Reading<S> reading{
-        .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference.slip, .phi = S(1.0)};
-    // The observed force is delayed. The curve gives its change with the slip since then.
-    const S force_N = observer_.force_N() + peak_.force_N(slip) - peak_.force_N(late_slip_);
-    const S reference_m_s2 = reference.rate_per_s * v_x;
-
-    // e_v' = -ks0 I - ks1 e_v, as in (16), with a reference that moves and a brake that is off by the observed error.
-    const S nu = paper::Laws<S>::nu(gains_, integral_.value_m(), error_m_s);
-    const S wanted_Nm = laws_.T_b(laws_.xi_1(reading, nu, force_N) + reference_m_s2) - observer_.brake_error_Nm();
-    const auto lags = rig::is_finite(input.max_brake_torque_Nm);
-    if (!rig::any(lags)) return wanted_Nm;
-
-    const WheelMotion<S> motion = wheel_motion(
-        laws_, speeds, slip, reference.slip,
-        {.tyre_force_N = force_N, .brake_torque_Nm = input.brake_torque_Nm + observer_.brake_error_Nm()}, v_min_m_s_);
-    const S wanted_rate_Nm_s =
-        laws_.T_b(paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2 - reference_m_s2) +
-                  laws_.k(reading) * peak_.force_slope_N(slip) * motion.slip_rate_per_s);
-    const S catch_up_Nm = lag_decay_ * (input.brake_torque_Nm - wanted_Nm);
-    return rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, S(period_s_ * wanted_rate_Nm_s + catch_up_Nm)),
-                       wanted_Nm);
-  }
+                             const S& error_m_s) const noexcept;
 
   paper::Laws<S> laws_{};
   paper::Gains<S> gains_{};
@@ -118,5 +56,82 @@ class AdaptivePeakLaw {
   S half_late_slip_{0.0};
   S late_slip_{0.0};
 };
+
+template <class S>
+void AdaptivePeakLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  observer_.reset(input.speeds);
+  peak_.reset();
+  centre_ = options_.slip_start;
+  integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, centre_), centre_);
+  search_angle_rad_ = S(0.0);
+  half_late_slip_ = late_slip_ = S(0.0);
+}
+
+template <class S>
+void AdaptivePeakLaw<S>::learn(const S& dt_s, const S& slip) noexcept {
+  if (!rig::any(dt_s > 0.0)) return;
+  const S covered = -rig::exponential_less_one(S(-2.0 * dt_s / observer_.force_delay_s()));
+  half_late_slip_ += covered * (slip - half_late_slip_);
+  late_slip_ += covered * (half_late_slip_ - late_slip_);
+  peak_.update(dt_s, late_slip_, observer_.force_N());
+}
+
+template <class S>
+typename AdaptivePeakLaw<S>::Reference AdaptivePeakLaw<S>::next_reference(const S& dt_s) noexcept {
+  const S target = rig::clamped(peak_.peak_slip(), options_.slip_min, options_.slip_max);
+  const S most = options_.slip_rate_per_s * dt_s;
+  const S step = rig::clamped(S(target - centre_), S(-most), most);
+  centre_ += step;
+  search_angle_rad_ = within_half_turn_rad(S(search_angle_rad_ + options_.search_rad_s * dt_s));
+  const S swing = rig::larger(S(options_.search_part * centre_), options_.search_min);
+  return {.slip = centre_ + swing * rig::sine(search_angle_rad_),
+          .rate_per_s = rig::select(dt_s > 0.0, S(step / dt_s), S(0.0)) +
+                        swing * options_.search_rad_s * rig::cosine(search_angle_rad_)};
+}
+
+template <class S>
+BasicSlipOutput<S> AdaptivePeakLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  observer_.update(input);
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  const S v_x = laws_.r2 * speeds.omega2_rad_s;
+  const S slip = rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), v_x, v_min_m_s_);
+  learn(input.dt_s, slip);
+  const Reference reference = next_reference(input.dt_s);
+
+  const S error_m_s = slip_velocity_error_m_s(laws_, speeds, reference.slip);
+  integral_.advance(input, error_m_s, reference.slip, v_x);
+  return {.brake_torque_Nm = command_Nm(input, slip, reference, error_m_s),
+          .slip_velocity_error_m_s = error_m_s,
+          .theta_est_N = peak_.peak_force_N(),
+          .slip_ref = reference.slip};
+}
+
+template <class S>
+S AdaptivePeakLaw<S>::command_Nm(const BasicSlipInput<S>& input, const S& slip, const Reference& reference,
+                                 const S& error_m_s) const noexcept {
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  const S v_x = rig::larger(S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
+  // The observed force replaces theta phi: theta is the force, and phi is 1.
+  const paper::Reading<S> reading{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference.slip, .phi = S(1.0)};
+  // The observed force is delayed. The curve gives its change with the slip since then.
+  const S force_N = observer_.force_N() + peak_.force_N(slip) - peak_.force_N(late_slip_);
+  const S reference_m_s2 = reference.rate_per_s * v_x;
+
+  // e_v' = -ks0 I - ks1 e_v, as in (16), with a reference that moves and a brake that is off by the observed error.
+  const S nu = paper::Laws<S>::nu(gains_, integral_.value_m(), error_m_s);
+  const S wanted_Nm = laws_.T_b(laws_.xi_1(reading, nu, force_N) + reference_m_s2) - observer_.brake_error_Nm();
+  const auto lags = rig::is_finite(input.max_brake_torque_Nm);
+  if (!rig::any(lags)) return wanted_Nm;
+
+  const WheelMotion<S> motion = wheel_motion(
+      laws_, speeds, slip, reference.slip,
+      {.tyre_force_N = force_N, .brake_torque_Nm = input.brake_torque_Nm + observer_.brake_error_Nm()}, v_min_m_s_);
+  const S wanted_rate_Nm_s = laws_.T_b(paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2 - reference_m_s2) +
+                                       laws_.k(reading) * peak_.force_slope_N(slip) * motion.slip_rate_per_s);
+  const S catch_up_Nm = lag_decay_ * (input.brake_torque_Nm - wanted_Nm);
+  return rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, S(period_s_ * wanted_rate_Nm_s + catch_up_Nm)),
+                     wanted_Nm);
+}
 
 }  // namespace abs_hil::control

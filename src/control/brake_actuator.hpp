@@ -38,24 +38,9 @@ class BasicBrakeActuator {
     was_in_gap_ = S(0.0);
   }
   /// Advances the model by `dt_s` under the duty of the last `command` (the torque, if ideal): exact solution of (6).
-  void advance(const S& dt_s) noexcept {
-    if constexpr (std::is_same_v<S, double>) {
-      if (!(dt_s > 0.0)) return;
-      if (dt_s != prepared_s_) prepare(dt_s);
-    }
-    const S change_Nm = (target_Nm_ - torque_Nm_) * covered_;
-    // The integral of the distance is its loss / c31.
-    const S mean_Nm = target_Nm_ - change_Nm / (brake_.c31_per_s * dt_s);
-    const auto moves = covered_ > 0.0;  // not by a lag so long that the share vanishes
-    mean_torque_Nm_ = rig::select(ideal_ > 0.0, target_Nm_, rig::select(moves, mean_Nm, torque_Nm_));
-    torque_Nm_ = rig::select(ideal_ > 0.0, torque_Nm_, S(torque_Nm_ + change_Nm));
-  }
+  void advance(const S& dt_s) noexcept;
   /// Prepares `advance` for this time; otherwise `advance` does it when the time changes.
-  void prepare(const S& dt_s) noexcept {
-    prepared_s_ = dt_s;
-    // (6) at a constant duty: the distance to b(u) shrinks by exp(-c31 dt).
-    covered_ = -rig::exponential_less_one(S(-brake_.c31_per_s * dt_s));
-  }
+  void prepare(const S& dt_s) noexcept;
   /// Stores the command that was sent now: its duty in [0, 1], or, if ideal, its torque, >= 0.
   void command(const S& duty, const S& torque_Nm) noexcept {
     target_Nm_ = static_torque_Nm(duty, torque_Nm);
@@ -77,39 +62,11 @@ class BasicBrakeActuator {
   /// What to send for a reference torque, `dt_s` after the last call: `limited` and `duty_for`, except in the gap
   /// between 0 and the least torque that the dead zone leaves. There it switches between the two ends, so that their
   /// mean is the reference torque: nothing between them can be sent.
-  [[nodiscard]] Target next(const S& torque_Nm, const S& dt_s) noexcept {
-    // Time between two decisions in the gap: a period of the boards' PWMs at their default of 160 Hz, and far below the
-    // time constant of the brake.
-    constexpr double gap_hold_s = 1.0 / 160.0;
-    constexpr double rounding_s = 1e-9;
-    const auto in_gap = torque_Nm > 0.0 && torque_Nm < least_.torque_Nm && least_.torque_Nm <= max_torque_Nm_;
-    Target target = nearest(torque_Nm);
-    if (rig::any(in_gap)) {
-      const auto stays = in_gap && was_in_gap_ > 0.0;
-      const S most_Nms = least_.torque_Nm * gap_hold_s;
-      const S owed_Nms = rig::clamped(S(owed_Nms_ + (torque_Nm - end_.torque_Nm) * dt_s), S(-most_Nms), most_Nms);
-      owed_Nms_ = rig::select(in_gap, rig::select(stays, owed_Nms, S(0.0)), owed_Nms_);
-      held_s_ = rig::select(in_gap, S(held_s_ + dt_s), held_s_);
-      const auto decides = in_gap && (!stays || held_s_ + rounding_s >= gap_hold_s);
-      const auto brakes = owed_Nms_ + torque_Nm * gap_hold_s >= 0.5 * most_Nms;
-      end_.torque_Nm = rig::select(decides, rig::select(brakes, least_.torque_Nm, S(0.0)), end_.torque_Nm);
-      end_.duty = rig::select(decides, rig::select(brakes, least_.duty, S(0.0)), end_.duty);
-      held_s_ = rig::select(decides, S(0.0), held_s_);
-      target.torque_Nm = rig::select(in_gap, end_.torque_Nm, target.torque_Nm);
-      target.duty = rig::select(in_gap, end_.duty, target.duty);
-    }
-    was_in_gap_ = rig::select(in_gap, S(1.0), S(0.0));
-    return target;
-  }
+  [[nodiscard]] Target next(const S& torque_Nm, const S& dt_s) noexcept;
   /// What is missing of a finite reference torque in a static torque that was sent for it, N m: > 0 if less was sent
   /// (limits, rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two.
   /// @param target_Nm  the torque of `next` for the reference torque
-  [[nodiscard]] S unsent_Nm(const S& reference_Nm, const S& target_Nm, const S& sent_Nm) const noexcept {
-    constexpr double rounding_Nm = 1e-9;
-    const auto in_reach = reference_Nm >= 0.0 && reference_Nm <= max_torque_Nm_;
-    const auto as_wanted = rig::magnitude(S(target_Nm - sent_Nm)) <= half_step_Nm_ + rounding_Nm;
-    return rig::select(in_reach && as_wanted, S(0.0), S(reference_Nm - sent_Nm));
-  }
+  [[nodiscard]] S unsent_Nm(const S& reference_Nm, const S& target_Nm, const S& sent_Nm) const noexcept;
   /// Static torque b(u) of a command; its torque, if ideal.
   [[nodiscard]] S static_torque_Nm(const S& duty, const S& torque_Nm) const noexcept {
     return rig::select(ideal_ > 0.0, rig::larger(S(0.0), torque_Nm), rig::brake_torque_at(brake_, duty));
@@ -146,5 +103,60 @@ class BasicBrakeActuator {
   S mean_torque_Nm_{0.0};
 };
 using BrakeActuator = BasicBrakeActuator<double>;
+
+template <class S>
+void BasicBrakeActuator<S>::prepare(const S& dt_s) noexcept {
+  prepared_s_ = dt_s;
+  // (6) at a constant duty: the distance to b(u) shrinks by exp(-c31 dt).
+  covered_ = -rig::exponential_less_one(S(-brake_.c31_per_s * dt_s));
+}
+
+template <class S>
+void BasicBrakeActuator<S>::advance(const S& dt_s) noexcept {
+  if constexpr (std::is_same_v<S, double>) {
+    if (!(dt_s > 0.0)) return;
+    if (dt_s != prepared_s_) prepare(dt_s);
+  }
+  const S change_Nm = (target_Nm_ - torque_Nm_) * covered_;
+  // The integral of the distance is its loss / c31.
+  const S mean_Nm = target_Nm_ - change_Nm / (brake_.c31_per_s * dt_s);
+  const auto moves = covered_ > 0.0;  // not by a lag so long that the share vanishes
+  mean_torque_Nm_ = rig::select(ideal_ > 0.0, target_Nm_, rig::select(moves, mean_Nm, torque_Nm_));
+  torque_Nm_ = rig::select(ideal_ > 0.0, torque_Nm_, S(torque_Nm_ + change_Nm));
+}
+
+template <class S>
+auto BasicBrakeActuator<S>::next(const S& torque_Nm, const S& dt_s) noexcept -> Target {
+  // Time between two decisions in the gap: a period of the boards' PWMs at their default of 160 Hz, and far below the
+  // time constant of the brake.
+  constexpr double gap_hold_s = 1.0 / 160.0;
+  constexpr double rounding_s = 1e-9;
+  const auto in_gap = torque_Nm > 0.0 && torque_Nm < least_.torque_Nm && least_.torque_Nm <= max_torque_Nm_;
+  Target target = nearest(torque_Nm);
+  if (rig::any(in_gap)) {
+    const auto stays = in_gap && was_in_gap_ > 0.0;
+    const S most_Nms = least_.torque_Nm * gap_hold_s;
+    const S owed_Nms = rig::clamped(S(owed_Nms_ + (torque_Nm - end_.torque_Nm) * dt_s), S(-most_Nms), most_Nms);
+    owed_Nms_ = rig::select(in_gap, rig::select(stays, owed_Nms, S(0.0)), owed_Nms_);
+    held_s_ = rig::select(in_gap, S(held_s_ + dt_s), held_s_);
+    const auto decides = in_gap && (!stays || held_s_ + rounding_s >= gap_hold_s);
+    const auto brakes = owed_Nms_ + torque_Nm * gap_hold_s >= 0.5 * most_Nms;
+    end_.torque_Nm = rig::select(decides, rig::select(brakes, least_.torque_Nm, S(0.0)), end_.torque_Nm);
+    end_.duty = rig::select(decides, rig::select(brakes, least_.duty, S(0.0)), end_.duty);
+    held_s_ = rig::select(decides, S(0.0), held_s_);
+    target.torque_Nm = rig::select(in_gap, end_.torque_Nm, target.torque_Nm);
+    target.duty = rig::select(in_gap, end_.duty, target.duty);
+  }
+  was_in_gap_ = rig::select(in_gap, S(1.0), S(0.0));
+  return target;
+}
+
+template <class S>
+S BasicBrakeActuator<S>::unsent_Nm(const S& reference_Nm, const S& target_Nm, const S& sent_Nm) const noexcept {
+  constexpr double rounding_Nm = 1e-9;
+  const auto in_reach = reference_Nm >= 0.0 && reference_Nm <= max_torque_Nm_;
+  const auto as_wanted = rig::magnitude(S(target_Nm - sent_Nm)) <= half_step_Nm_ + rounding_Nm;
+  return rig::select(in_reach && as_wanted, S(0.0), S(reference_Nm - sent_Nm));
+}
 
 }  // namespace abs_hil::control

@@ -25,23 +25,9 @@ class BasicBrakingStiffness {
       : memory_s_{memory_s}, slip_noise_{slip_noise} {}
 
   void reset() noexcept { slip_ = force_N_ = variance_ = covariance_N_ = S(0.0); }
-  void learn(const S& dt_s, const S& slip, const S& force_N) noexcept {
-    const S share = -rig::exponential_less_one(S(-dt_s / memory_s_));
-    const S slip_off = slip - slip_, force_off_N = force_N - force_N_;
-    slip_ += share * slip_off;
-    force_N_ += share * force_off_N;
-    variance_ = (1.0 - share) * (variance_ + share * slip_off * slip_off);
-    covariance_N_ = (1.0 - share) * (covariance_N_ + share * slip_off * force_off_N);
-  }
+  void learn(const S& dt_s, const S& slip, const S& force_N) noexcept;
   /// d ln F / d ln slip at the mean of late, in [-1, 1]: 1 far below the peak, 0 at it, negative past it.
-  [[nodiscard]] S elasticity() const noexcept {
-    constexpr double least_force_N = 1.0;
-    constexpr double least_slip = 1e-3;
-    const S slip = rig::larger(S(least_slip), slip_), force_N = rig::larger(S(least_force_N), force_N_);
-    const S unknown = slip_noise_ * slip_noise_;
-    const S slope_N = (covariance_N_ + unknown * force_N / slip) / (variance_ + unknown);
-    return rig::clamped(S(slope_N * slip / force_N), S(-1.0), S(1.0));
-  }
+  [[nodiscard]] S elasticity() const noexcept;
 
  private:
   S memory_s_{1.0};
@@ -50,6 +36,26 @@ class BasicBrakingStiffness {
   S variance_{0.0}, covariance_N_{0.0};
 };
 using BrakingStiffness = BasicBrakingStiffness<double>;
+
+template <class S>
+void BasicBrakingStiffness<S>::learn(const S& dt_s, const S& slip, const S& force_N) noexcept {
+  const S share = -rig::exponential_less_one(S(-dt_s / memory_s_));
+  const S slip_off = slip - slip_, force_off_N = force_N - force_N_;
+  slip_ += share * slip_off;
+  force_N_ += share * force_off_N;
+  variance_ = (1.0 - share) * (variance_ + share * slip_off * slip_off);
+  covariance_N_ = (1.0 - share) * (covariance_N_ + share * slip_off * force_off_N);
+}
+
+template <class S>
+S BasicBrakingStiffness<S>::elasticity() const noexcept {
+  constexpr double least_force_N = 1.0;
+  constexpr double least_slip = 1e-3;
+  const S slip = rig::larger(S(least_slip), slip_), force_N = rig::larger(S(least_force_N), force_N_);
+  const S unknown = slip_noise_ * slip_noise_;
+  const S slope_N = (covariance_N_ + unknown * force_N / slip) / (variance_ + unknown);
+  return rig::clamped(S(slope_N * slip / force_N), S(-1.0), S(1.0));
+}
 
 /// Seeks the peak of the tyre force by the extended braking stiffness (Umeno, 2002; Hoang et al., 2014): the logarithm
 /// of the wanted slip moves in proportion to the elasticity of the force less a small wanted one, with a small sine on
@@ -64,45 +70,14 @@ class BrakingStiffnessLaw {
   /// Throws std::invalid_argument for options out of range.
   explicit BrakingStiffnessLaw(const ControllerContext& context);
 
-  void reset(const BasicSlipInput<S>& input) noexcept {
-    observer_.reset(input.speeds);
-    stiffness_.reset();
-    late_slip_ = search_rad_ = S(0.0);
-    reference_ = options_.slip_start;
-  }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
-    observer_.update(input);
-    const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
-    move_reference(input.dt_s,
-                   rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_));
-    const S reference = reference_ * (1.0 + options_.search_part * rig::sine(search_rad_));
-    const paper::Reading<S> now{
-        .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference, .phi = S(1.0)};
-    const S error_m_s = laws_.e_v(now);
-    const S force_N = rig::larger(S(0.0), observer_.force_N());
-    const S wanted_Nm = rig::clamped(
-        S(laws_.T_b(laws_.xi_1(now, S(-options_.slip_gain_per_s * error_m_s), force_N)) - observer_.brake_error_Nm()),
-        S(0.0), full_torque_Nm(brake_, input.max_brake_torque_Nm));
-    const S step_Nm = torque_decay_ * (input.brake_torque_Nm - wanted_Nm);
-    const auto lags = rig::is_finite(input.max_brake_torque_Nm);
-    return {.brake_torque_Nm = rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, step_Nm), wanted_Nm),
-            .slip_velocity_error_m_s = error_m_s,
-            .theta_est_N = rig::unknown,
-            .slip_ref = reference};
-  }
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
   static constexpr std::array<rig::Signal, 1> signals{
       {{"elasticity", "estimated relative growth of the tyre force per relative growth of the slip"}}};
   void show(BasicSlipOutput<S>& output) const noexcept { output.signals[0] = stiffness_.elasticity(); }
 
  private:
-  void move_reference(const S& dt_s, const S& slip) noexcept {
-    if (!rig::any(dt_s > 0.0)) return;
-    late_slip_ += -rig::exponential_less_one(S(-dt_s / observer_.force_delay_s())) * (slip - late_slip_);
-    stiffness_.learn(dt_s, late_slip_, observer_.force_N());
-    const S rise = options_.rate_per_s * (stiffness_.elasticity() - options_.target) * dt_s;
-    reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), options_.slip_min, options_.slip_max);
-    search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
-  }
+  void move_reference(const S& dt_s, const S& slip) noexcept;
 
   paper::Laws<S> laws_{};
   rig::BasicBrake<S> brake_{};
@@ -116,5 +91,45 @@ class BrakingStiffnessLaw {
   S reference_{0.0};  ///< without the sine
   S search_rad_{0.0};
 };
+
+template <class S>
+void BrakingStiffnessLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  observer_.reset(input.speeds);
+  stiffness_.reset();
+  late_slip_ = search_rad_ = S(0.0);
+  reference_ = options_.slip_start;
+}
+
+template <class S>
+void BrakingStiffnessLaw<S>::move_reference(const S& dt_s, const S& slip) noexcept {
+  if (!rig::any(dt_s > 0.0)) return;
+  late_slip_ += -rig::exponential_less_one(S(-dt_s / observer_.force_delay_s())) * (slip - late_slip_);
+  stiffness_.learn(dt_s, late_slip_, observer_.force_N());
+  const S rise = options_.rate_per_s * (stiffness_.elasticity() - options_.target) * dt_s;
+  reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), options_.slip_min, options_.slip_max);
+  search_rad_ = within_half_turn_rad(S(search_rad_ + options_.search_rad_s * dt_s));
+}
+
+template <class S>
+BasicSlipOutput<S> BrakingStiffnessLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  observer_.update(input);
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  move_reference(input.dt_s,
+                 rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_));
+  const S reference = reference_ * (1.0 + options_.search_part * rig::sine(search_rad_));
+  const paper::Reading<S> now{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference, .phi = S(1.0)};
+  const S error_m_s = laws_.e_v(now);
+  const S force_N = rig::larger(S(0.0), observer_.force_N());
+  const S wanted_Nm = rig::clamped(
+      S(laws_.T_b(laws_.xi_1(now, S(-options_.slip_gain_per_s * error_m_s), force_N)) - observer_.brake_error_Nm()),
+      S(0.0), full_torque_Nm(brake_, input.max_brake_torque_Nm));
+  const S step_Nm = torque_decay_ * (input.brake_torque_Nm - wanted_Nm);
+  const auto lags = rig::is_finite(input.max_brake_torque_Nm);
+  return {.brake_torque_Nm = rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, step_Nm), wanted_Nm),
+          .slip_velocity_error_m_s = error_m_s,
+          .theta_est_N = rig::unknown,
+          .slip_ref = reference};
+}
 
 }  // namespace abs_hil::control

@@ -148,19 +148,7 @@ class MixedSlipDecelerationLaw {
   }
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept { integral_Nm_ = S(0.0); }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
-    constexpr double g_m_s2 = 9.81;
-    const S deceleration =
-        rig::select(turns(input.speeds.omega1_rad_s), S(-laws_.r1 * input.alpha1_rad_s2 / g_m_s2), S(0.0));
-    const S error = options_.target - (input.slip + options_.weight * deceleration);
-    const S full_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
-    // Where less was sent than asked for, the integral must not grow, and the other way round.
-    const S integral_Nm = rig::clamped(S(integral_Nm_ + options_.ki_Nm_s * error * input.dt_s), S(0.0), full_Nm);
-    integral_Nm_ = rig::select(input.unsent_torque_Nm * error > 0.0, integral_Nm_, integral_Nm);
-    return {.brake_torque_Nm = rig::clamped(S(options_.kp_Nm * error + integral_Nm_), S(0.0), full_Nm),
-            .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
-            .theta_est_N = rig::unknown};
-  }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
   void take_over(const MixedSlipDecelerationLaw& before) noexcept { integral_Nm_ = before.integral_Nm_; }
 
  private:
@@ -169,5 +157,20 @@ class MixedSlipDecelerationLaw {
   MixedSlipDecelerationOptions<S> options_{};
   S integral_Nm_{0.0};
 };
+
+template <class S>
+BasicSlipOutput<S> MixedSlipDecelerationLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  constexpr double g_m_s2 = 9.81;
+  const S deceleration =
+      rig::select(turns(input.speeds.omega1_rad_s), S(-laws_.r1 * input.alpha1_rad_s2 / g_m_s2), S(0.0));
+  const S error = options_.target - (input.slip + options_.weight * deceleration);
+  const S full_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
+  // Where less was sent than asked for, the integral must not grow, and the other way round.
+  const S integral_Nm = rig::clamped(S(integral_Nm_ + options_.ki_Nm_s * error * input.dt_s), S(0.0), full_Nm);
+  integral_Nm_ = rig::select(input.unsent_torque_Nm * error > 0.0, integral_Nm_, integral_Nm);
+  return {.brake_torque_Nm = rig::clamped(S(options_.kp_Nm * error + integral_Nm_), S(0.0), full_Nm),
+          .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
+          .theta_est_N = rig::unknown};
+}
 
 }  // namespace abs_hil::control

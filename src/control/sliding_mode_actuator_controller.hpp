@@ -45,19 +45,7 @@ class SlidingModeActuatorLaw {
     surface_.reset(input);
     wheels_observer_.reset(input.speeds);
   }
-  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept {
-    const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
-    if (rig::any(lags)) wheels_observer_.update(raw);
-    const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
-    const S error_m_s = surface_.observe(input);
-    const BasicWantedMotion<S> wanted =
-        boundary_layer_reference(error_m_s, gain_m_s2_, width_m_s_, surface_.period_s());
-    const S switching = -wanted.mean_rate_m_s2 / gain_m_s2_;
-    BasicSlipOutput<S> output = surface_.drive(input, error_m_s, wanted, switching);
-    if (rig::any(lags))
-      output.brake_torque_Nm = rig::select(lags, through_lag(input, output, switching), output.brake_torque_Nm);
-    return output;
-  }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept;
   void take_over(const SlidingModeActuatorLaw& before) noexcept {
     surface_.take_over(before.surface_);
     wheels_observer_.take_over(before.wheels_observer_);
@@ -65,28 +53,9 @@ class SlidingModeActuatorLaw {
 
  private:
   [[nodiscard]] S through_lag(const BasicSlipInput<S>& input, const BasicSlipOutput<S>& wanted,
-                              const S& switching) const noexcept {
-    const S arm = laws_.J1 / laws_.r1;
-    const S eta = (input.brake_torque_Nm - wanted.brake_torque_Nm) / arm;
-    const S rate = reference_rate_m_s3(input, wanted.slip_velocity_error_m_s, wanted.theta_est_N, switching) +
-                   lag_decay_per_s_ * eta;
-    return lag_.command_Nm(input.brake_torque_Nm, S(surface_.period_s() * arm * rate));
-  }
-  /// (r1/J1) alpha' by the model at theta_hat.
+                              const S& switching) const noexcept;
   [[nodiscard]] S reference_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s, const S& theta_N,
-                                      const S& switching) const noexcept {
-    const S phi = rig::normalised_tyre_force(tyre_, input.slip);
-    const S k = laws_.k({.lambda_ref = input.slip_ref});
-    const WheelMotion<S> motion =
-        wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
-                     {.tyre_force_N = theta_N * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
-    const auto inside = rig::magnitude(error_m_s) < width_m_s_;
-    const S wanted_rate = rig::select(inside, S(-gain_m_s2_ / width_m_s_ * motion.error_rate_m_s2), S(0.0));
-    const S theta_rate_N_s = -gamma_ * k * phi * switching;
-    return wanted_rate + k * phi * theta_rate_N_s +
-           k * theta_N * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
-           motion.drift_rate_m_s3;
-  }
+                                      const S& switching) const noexcept;
 
   paper::Laws<S> laws_{};
   rig::TyreShape<S> tyre_{};
@@ -99,5 +68,46 @@ class SlidingModeActuatorLaw {
   S gamma_{0.0};
   S v_min_m_s_{0.0};
 };
+
+template <class S>
+BasicSlipOutput<S> SlidingModeActuatorLaw<S>::step(const BasicSlipInput<S>& raw) noexcept {
+  const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
+  if (rig::any(lags)) wheels_observer_.update(raw);
+  const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
+  const S error_m_s = surface_.observe(input);
+  const BasicWantedMotion<S> wanted = boundary_layer_reference(error_m_s, gain_m_s2_, width_m_s_, surface_.period_s());
+  const S switching = -wanted.mean_rate_m_s2 / gain_m_s2_;
+  BasicSlipOutput<S> output = surface_.drive(input, error_m_s, wanted, switching);
+  if (rig::any(lags))
+    output.brake_torque_Nm = rig::select(lags, through_lag(input, output, switching), output.brake_torque_Nm);
+  return output;
+}
+
+template <class S>
+S SlidingModeActuatorLaw<S>::through_lag(const BasicSlipInput<S>& input, const BasicSlipOutput<S>& wanted,
+                                         const S& switching) const noexcept {
+  const S arm = laws_.J1 / laws_.r1;
+  const S eta = (input.brake_torque_Nm - wanted.brake_torque_Nm) / arm;
+  const S rate = reference_rate_m_s3(input, wanted.slip_velocity_error_m_s, wanted.theta_est_N, switching) +
+                 lag_decay_per_s_ * eta;
+  return lag_.command_Nm(input.brake_torque_Nm, S(surface_.period_s() * arm * rate));
+}
+
+/// (r1/J1) alpha' by the model at theta_hat.
+template <class S>
+S SlidingModeActuatorLaw<S>::reference_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s, const S& theta_N,
+                                                 const S& switching) const noexcept {
+  const S phi = rig::normalised_tyre_force(tyre_, input.slip);
+  const S k = laws_.k({.lambda_ref = input.slip_ref});
+  const WheelMotion<S> motion =
+      wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
+                   {.tyre_force_N = theta_N * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
+  const auto inside = rig::magnitude(error_m_s) < width_m_s_;
+  const S wanted_rate = rig::select(inside, S(-gain_m_s2_ / width_m_s_ * motion.error_rate_m_s2), S(0.0));
+  const S theta_rate_N_s = -gamma_ * k * phi * switching;
+  return wanted_rate + k * phi * theta_rate_N_s +
+         k * theta_N * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
+         motion.drift_rate_m_s3;
+}
 
 }  // namespace abs_hil::control

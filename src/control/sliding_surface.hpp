@@ -82,26 +82,11 @@ class BasicSlidingSurface {
   /// Adapts theta_hat over the past interval. theta_hat is held if the torque sent was not the reference torque and
   /// adaptation would drive the two further apart (anti-windup).
   /// @return e_v now
-  [[nodiscard]] S observe(const BasicSlipInput<S>& input) noexcept {
-    past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
-    slip_ = input.slip;
-    excess_ = input.unsent_torque_Nm;
-    // theta_hat changes by -phi s, and the torque by phi times this change.
-    const S gain_phi = laws_.k({.lambda_ref = input.slip_ref}) * past_phi_;
-    theta_.update(!winds_up(S(-switching_)), input.dt_s, gain_phi, switching_);
-    return slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
-  }
+  [[nodiscard]] S observe(const BasicSlipInput<S>& input) noexcept;
   /// The torque that moves e_v, now `error_m_s`, along the reference motion.
   /// @param switching  s for theta_hat over the coming interval, in [-1, 1]
   [[nodiscard]] BasicSlipOutput<S> drive(const BasicSlipInput<S>& input, const S& error_m_s,
-                                         const BasicWantedMotion<S>& wanted, const S& switching) noexcept {
-    const S torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
-    switching_ = switching;
-    // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
-    const auto outside = torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0;
-    excess_ = rig::select(outside, torque_Nm, excess_);
-    return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
-  }
+                                         const BasicWantedMotion<S>& wanted, const S& switching) noexcept;
 
   /// True if the last torque is not sent as it is and a change of this sign would drive it further out.
   [[nodiscard]] auto winds_up(const S& torque_change) const noexcept { return excess_ * torque_change > 0.0; }
@@ -117,5 +102,27 @@ class BasicSlidingSurface {
   S switching_{0.0};
   S excess_{0.0};  ///< > 0: less is sent than the reference torque, < 0: more is sent, 0: neither
 };
+
+template <class S>
+S BasicSlidingSurface<S>::observe(const BasicSlipInput<S>& input) noexcept {
+  past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
+  slip_ = input.slip;
+  excess_ = input.unsent_torque_Nm;
+  // theta_hat changes by -phi s, and the torque by phi times this change.
+  const S gain_phi = laws_.k({.lambda_ref = input.slip_ref}) * past_phi_;
+  theta_.update(!winds_up(S(-switching_)), input.dt_s, gain_phi, switching_);
+  return slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+}
+
+template <class S>
+BasicSlipOutput<S> BasicSlidingSurface<S>::drive(const BasicSlipInput<S>& input, const S& error_m_s,
+                                                 const BasicWantedMotion<S>& wanted, const S& switching) noexcept {
+  const S torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
+  switching_ = switching;
+  // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
+  const auto outside = torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0;
+  excess_ = rig::select(outside, torque_Nm, excess_);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
 
 }  // namespace abs_hil::control

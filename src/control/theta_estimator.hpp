@@ -68,33 +68,11 @@ class BasicThetaEstimator {
     theta_N_ = rig::clamped(before.theta_N_, theta_min_N_, theta_max_N_);
     zeta_N_ = before.zeta_N_;
   }
-  void update(const BasicAdaptationInterval<S>& past) noexcept {
-    const auto known = past.dt_s > 0.0 && turns(past.omega1_before_rad_s) && turns(past.omega1_after_rad_s);
-    if (!rig::any(known)) return;
-    const auto& w = laws_;
-    const S omega1_rate = (past.omega1_after_rad_s - past.omega1_before_rad_s) / past.dt_s;
-    const S omega1_mean = 0.5 * (past.omega1_before_rad_s + past.omega1_after_rad_s);
-    const S tyre_force_N = (w.J1 * omega1_rate + w.d1 * omega1_mean + w.M10 + past.brake_torque_Nm) / w.r1;
-    update_where(known, {past.dt_s, tyre_force_N, past.phi, past.zeta_rate_N_s});
-  }
+  void update(const BasicAdaptationInterval<S>& past) noexcept;
   void update(const BasicForceInterval<S>& past) noexcept { update_where(past.dt_s > 0.0, past); }
   /// The same, but only where `known`: elsewhere the force is not.
   template <class Condition>
-  void update_where(const Condition& known, const BasicForceInterval<S>& past) noexcept {
-    constexpr double least_decay = 1e-12;  // the quotient of two numbers below it loses its digits
-    const auto adapts = known && past.phi > 0.0;
-    if (!rig::any(adapts)) return;
-    // theta' = rate_now - decay (theta - theta_now): over dt it covers (1 - exp(-decay dt))/decay of the present rate.
-    const S rate_now = past.zeta_rate_N_s + innovation_gain_ * (past.tyre_force_N - past.phi * theta_N_);
-    const S decay = innovation_gain_ * past.phi;
-    const S share = decay * past.dt_s;
-    // For a decay that vanishes, that is dt.
-    const S covered_s =
-        rig::select(rig::magnitude(share) < least_decay, past.dt_s, S(-rig::exponential_less_one(S(-share)) / decay));
-    const S theta_N = rig::clamped(S(theta_N_ + covered_s * rate_now), theta_min_N_, theta_max_N_);
-    theta_N_ = rig::select(adapts, theta_N, theta_N_);
-    zeta_N_ = rig::select(adapts, S(zeta_N_ + past.zeta_rate_N_s * past.dt_s), zeta_N_);
-  }
+  void update_where(const Condition& known, const BasicForceInterval<S>& past) noexcept;
 
   [[nodiscard]] S theta_N() const noexcept { return theta_N_; }
   /// zeta of (17): the integral of zeta' from zeta0 while adaptation is not frozen, not projected.
@@ -115,5 +93,34 @@ class BasicThetaEstimator {
   S zeta_N_{0.0};
 };
 using ThetaEstimator = BasicThetaEstimator<double>;
+
+template <class S>
+void BasicThetaEstimator<S>::update(const BasicAdaptationInterval<S>& past) noexcept {
+  const auto known = past.dt_s > 0.0 && turns(past.omega1_before_rad_s) && turns(past.omega1_after_rad_s);
+  if (!rig::any(known)) return;
+  const auto& w = laws_;
+  const S omega1_rate = (past.omega1_after_rad_s - past.omega1_before_rad_s) / past.dt_s;
+  const S omega1_mean = 0.5 * (past.omega1_before_rad_s + past.omega1_after_rad_s);
+  const S tyre_force_N = (w.J1 * omega1_rate + w.d1 * omega1_mean + w.M10 + past.brake_torque_Nm) / w.r1;
+  update_where(known, {past.dt_s, tyre_force_N, past.phi, past.zeta_rate_N_s});
+}
+
+template <class S>
+template <class Condition>
+void BasicThetaEstimator<S>::update_where(const Condition& known, const BasicForceInterval<S>& past) noexcept {
+  constexpr double least_decay = 1e-12;  // the quotient of two numbers below it loses its digits
+  const auto adapts = known && past.phi > 0.0;
+  if (!rig::any(adapts)) return;
+  // theta' = rate_now - decay (theta - theta_now): over dt it covers (1 - exp(-decay dt))/decay of the present rate.
+  const S rate_now = past.zeta_rate_N_s + innovation_gain_ * (past.tyre_force_N - past.phi * theta_N_);
+  const S decay = innovation_gain_ * past.phi;
+  const S share = decay * past.dt_s;
+  // For a decay that vanishes, that is dt.
+  const S covered_s =
+      rig::select(rig::magnitude(share) < least_decay, past.dt_s, S(-rig::exponential_less_one(S(-share)) / decay));
+  const S theta_N = rig::clamped(S(theta_N_ + covered_s * rate_now), theta_min_N_, theta_max_N_);
+  theta_N_ = rig::select(adapts, theta_N, theta_N_);
+  zeta_N_ = rig::select(adapts, S(zeta_N_ + past.zeta_rate_N_s * past.dt_s), zeta_N_);
+}
 
 }  // namespace abs_hil::control

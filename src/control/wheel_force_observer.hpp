@@ -28,40 +28,14 @@ class BasicWheelForceObserver {
   BasicWheelForceObserver(const ForceObserverOptions<>& options, const rig::RigParameters& rig, double rate_Hz);
 
   /// Starts from these speeds with zero force.
-  void reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept {
-    state_ = State{};
-    state_[omega1] = speeds.omega1_rad_s;
-    state_[omega2] = speeds.omega2_rad_s;
-    last_speeds_ = speeds;
-  }
+  void reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept;
   /// Takes over the other's estimates.
   void take_over(const BasicWheelForceObserver& before) noexcept {
     state_ = before.state_;
     last_speeds_ = before.last_speeds_;
   }
   /// Updates by one interval. If the travel is unknown, `input.speeds` give it.
-  void update(const BasicSlipInput<S>& input) noexcept {
-    const auto later = input.dt_s > 0.0;
-    if (!rig::any(later)) return;
-    const auto unknown = rig::is_nan(input.upper_travel_rad) || rig::is_nan(input.lower_travel_rad);
-    const auto& last = last_speeds_;
-    const S upper_rad = rig::select(unknown, S(0.5 * (last.omega1_rad_s + input.speeds.omega1_rad_s) * input.dt_s),
-                                    input.upper_travel_rad);
-    const S lower_rad = rig::select(unknown, S(0.5 * (last.omega2_rad_s + input.speeds.omega2_rad_s) * input.dt_s),
-                                    input.lower_travel_rad);
-    last_speeds_ = input.speeds;
-
-    predict(input.dt_s, input.mean_brake_torque_Nm);
-    const S upper_residual = upper_rad - state_[angle1];
-    const S lower_residual = lower_rad - state_[angle2];
-    for (std::size_t i = 0; i < state_.size(); ++i) {
-      state_[i] += upper_gain_[i] * upper_residual + lower_gain_[i] * lower_residual;
-    }
-    state_[angle1] -= upper_rad;
-    state_[angle2] -= lower_rad;
-    state_[omega1] = rig::larger(S(0.0), state_[omega1]);
-    state_[omega2] = rig::larger(S(0.0), state_[omega2]);
-  }
+  void update(const BasicSlipInput<S>& input) noexcept;
 
   [[nodiscard]] rig::BasicWheelSpeeds<S> speeds() const noexcept { return {state_[omega1], state_[omega2]}; }
   [[nodiscard]] S force_N() const noexcept { return state_[force]; }
@@ -74,19 +48,7 @@ class BasicWheelForceObserver {
   using State = std::array<S, 6>;
   enum Index : std::size_t { angle1, omega1, angle2, omega2, force, brake_error };
 
-  void predict(const S& dt_s, const S& brake_torque_Nm) noexcept {
-    const auto& w = laws_;
-    const S alpha1 =
-        (w.r1 * state_[force] - w.d1 * state_[omega1] - w.M10 - brake_torque_Nm - state_[brake_error]) / w.J1;
-    const S alpha2 = (-w.r2 * state_[force] - w.d2 * state_[omega2] - w.M20) / w.J2;
-    // The brake stops a wheel but cannot turn it backwards.
-    const S omega1_after = rig::larger(S(0.0), S(state_[omega1] + alpha1 * dt_s));
-    const S omega2_after = rig::larger(S(0.0), S(state_[omega2] + alpha2 * dt_s));
-    state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;
-    state_[angle2] += 0.5 * (state_[omega2] + omega2_after) * dt_s;
-    state_[omega1] = omega1_after;
-    state_[omega2] = omega2_after;
-  }
+  void predict(const S& dt_s, const S& brake_torque_Nm) noexcept;
 
   paper::Laws<S> laws_{};
   State upper_gain_{};  ///< on the residual of the upper wheel's angle
@@ -96,5 +58,52 @@ class BasicWheelForceObserver {
   rig::BasicWheelSpeeds<S> last_speeds_{};
 };
 using WheelForceObserver = BasicWheelForceObserver<double>;
+
+template <class S>
+void BasicWheelForceObserver<S>::reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept {
+  state_ = State{};
+  state_[omega1] = speeds.omega1_rad_s;
+  state_[omega2] = speeds.omega2_rad_s;
+  last_speeds_ = speeds;
+}
+
+template <class S>
+void BasicWheelForceObserver<S>::predict(const S& dt_s, const S& brake_torque_Nm) noexcept {
+  const auto& w = laws_;
+  const S alpha1 =
+      (w.r1 * state_[force] - w.d1 * state_[omega1] - w.M10 - brake_torque_Nm - state_[brake_error]) / w.J1;
+  const S alpha2 = (-w.r2 * state_[force] - w.d2 * state_[omega2] - w.M20) / w.J2;
+  // The brake stops a wheel but cannot turn it backwards.
+  const S omega1_after = rig::larger(S(0.0), S(state_[omega1] + alpha1 * dt_s));
+  const S omega2_after = rig::larger(S(0.0), S(state_[omega2] + alpha2 * dt_s));
+  state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;
+  state_[angle2] += 0.5 * (state_[omega2] + omega2_after) * dt_s;
+  state_[omega1] = omega1_after;
+  state_[omega2] = omega2_after;
+}
+
+template <class S>
+void BasicWheelForceObserver<S>::update(const BasicSlipInput<S>& input) noexcept {
+  const auto later = input.dt_s > 0.0;
+  if (!rig::any(later)) return;
+  const auto unknown = rig::is_nan(input.upper_travel_rad) || rig::is_nan(input.lower_travel_rad);
+  const auto& last = last_speeds_;
+  const S upper_rad = rig::select(unknown, S(0.5 * (last.omega1_rad_s + input.speeds.omega1_rad_s) * input.dt_s),
+                                  input.upper_travel_rad);
+  const S lower_rad = rig::select(unknown, S(0.5 * (last.omega2_rad_s + input.speeds.omega2_rad_s) * input.dt_s),
+                                  input.lower_travel_rad);
+  last_speeds_ = input.speeds;
+
+  predict(input.dt_s, input.mean_brake_torque_Nm);
+  const S upper_residual = upper_rad - state_[angle1];
+  const S lower_residual = lower_rad - state_[angle2];
+  for (std::size_t i = 0; i < state_.size(); ++i) {
+    state_[i] += upper_gain_[i] * upper_residual + lower_gain_[i] * lower_residual;
+  }
+  state_[angle1] -= upper_rad;
+  state_[angle2] -= lower_rad;
+  state_[omega1] = rig::larger(S(0.0), state_[omega1]);
+  state_[omega2] = rig::larger(S(0.0), state_[omega2]);
+}
 
 }  // namespace abs_hil::control

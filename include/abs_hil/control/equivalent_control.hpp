@@ -34,21 +34,7 @@ class BasicEquivalentControl {
   /// @return brake torque to hold for one period, N m; may lie outside what the actuator can give. Real-time safe.
   [[nodiscard]] S brake_torque_Nm(const BasicSlipInput<S>& input, const S& error_m_s,
                                   const BasicWantedMotion<S>& wanted, const S& theta_N,
-                                  const S& recent_phi) const noexcept {
-    const auto& w = laws_;
-    // Prediction for the middle of the period: e_v on the reference trajectory, v_x by (9).
-    const S v_x = w.r2 * input.speeds.omega2_rad_s;
-    const S v_x_rate = -w.r2 / w.J2 * (w.r2 * theta_N * recent_phi + w.d2 * input.speeds.omega2_rad_s + w.M20);
-    const S v_x_mid = v_x + half_period_s_ * v_x_rate;
-    // slip = slip_ref + e_v/v_x by (12)-(13). Only the change is predicted, so that h -> 0 gives the measured slip.
-    const S slip_mid = input.slip + wanted.error_at_mid_m_s / rig::larger(v_x_mid, v_min_m_s_) -
-                       error_m_s / rig::larger(v_x, v_min_m_s_);
-    const paper::Reading<S> mid{.omega1 = ((1.0 - input.slip_ref) * v_x_mid - wanted.error_at_mid_m_s) / w.r1,
-                                .omega2 = v_x_mid / w.r2,
-                                .lambda_ref = input.slip_ref,
-                                .phi = rig::normalised_tyre_force(tyre_, slip_mid)};
-    return w.T_b(w.xi_1(mid, wanted.mean_rate_m_s2, theta_N));
-  }
+                                  const S& recent_phi) const noexcept;
 
   [[nodiscard]] S period_s() const noexcept { return 2.0 * half_period_s_; }
 
@@ -59,5 +45,24 @@ class BasicEquivalentControl {
   S half_period_s_{0.0};
 };
 using EquivalentControl = BasicEquivalentControl<double>;
+
+template <class S>
+S BasicEquivalentControl<S>::brake_torque_Nm(const BasicSlipInput<S>& input, const S& error_m_s,
+                                             const BasicWantedMotion<S>& wanted, const S& theta_N,
+                                             const S& recent_phi) const noexcept {
+  const auto& w = laws_;
+  // Prediction for the middle of the period: e_v on the reference trajectory, v_x by (9).
+  const S v_x = w.r2 * input.speeds.omega2_rad_s;
+  const S v_x_rate = -w.r2 / w.J2 * (w.r2 * theta_N * recent_phi + w.d2 * input.speeds.omega2_rad_s + w.M20);
+  const S v_x_mid = v_x + half_period_s_ * v_x_rate;
+  // slip = slip_ref + e_v/v_x by (12)-(13). Only the change is predicted, so that h -> 0 gives the measured slip.
+  const S slip_mid = input.slip + wanted.error_at_mid_m_s / rig::larger(v_x_mid, v_min_m_s_) -
+                     error_m_s / rig::larger(v_x, v_min_m_s_);
+  const paper::Reading<S> mid{.omega1 = ((1.0 - input.slip_ref) * v_x_mid - wanted.error_at_mid_m_s) / w.r1,
+                              .omega2 = v_x_mid / w.r2,
+                              .lambda_ref = input.slip_ref,
+                              .phi = rig::normalised_tyre_force(tyre_, slip_mid)};
+  return w.T_b(w.xi_1(mid, wanted.mean_rate_m_s2, theta_N));
+}
 
 }  // namespace abs_hil::control
