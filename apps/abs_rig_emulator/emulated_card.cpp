@@ -304,7 +304,7 @@ fuse_operations operations() {
   return ops;
 }
 
-/// Takes away what an emulator that was killed leaves at `root`: a mount that answers nothing but ENOTCONN.
+/// Unmounts `root` if an emulator that was killed left it mounted: every access to such a mount fails with ENOTCONN.
 void detach_dead_mount(const std::string& root) {
   struct stat folder {};
   if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;

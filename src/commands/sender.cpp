@@ -54,7 +54,9 @@ class Answers {
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
       if (left <= 0) return;
       pollfd ready{receiver_.file_descriptor(), POLLIN, 0};
-      if (::poll(&ready, 1, static_cast<int>(left)) > 0) receiver_.poll(1);
+      if (::poll(&ready, 1, static_cast<int>(left)) <= 0) continue;
+      receiver_.poll(1);
+      if (receiver_.file_descriptor() < 0) return;  // the tcpq server is gone, and no answer can come
     }
   }
 

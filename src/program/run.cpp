@@ -151,7 +151,7 @@ class Questions {
       asked_ = -1;
     } else if (asked_ != latest.phase_index) {
       asked_ = latest.phase_index;
-      // An Enter from before answers nothing.
+      // Enter pressed before the question was asked is no answer to it.
       if (terminal_) static_cast<void>(::tcflush(STDIN_FILENO, TCIFLUSH));
       fmt::print(stderr, "\n{}{}\n", question, commands_ ? " (or: abs_hil send continue)" : "");
       std::fflush(stderr);
