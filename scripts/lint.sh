@@ -29,7 +29,7 @@ check_python() {
 
 check_cppcheck() {
   cppcheck --enable=warning,performance,portability --error-exitcode=1 --inline-suppr --quiet --std=c++20 --language=c++ \
-    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions -I include -I src -I third_party src apps
+    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions --library=.cppcheck-library.xml -I include -I src -I third_party src apps
 }
 
 check_tidy() {

@@ -16,7 +16,7 @@ fmi3Status done(fmi3Instance instance, const Action& action) noexcept {
 }
 
 template <class Action>
-fmi3Status done_with(size_t references, size_t values, fmi3Instance instance, const Action& action) noexcept {
+fmi3Status done_with(size_t references, size_t values, fmi3Instance instance, const Action& action) {
   return done(instance, [&] {
     if (references != values)
       throw std::invalid_argument("as many values as references are needed: there are no arrays here");
@@ -116,13 +116,12 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String, fmi3String, fmi3Strin
                                                fmi3LockPreemptionCallback, fmi3UnlockPreemptionCallback) {
   return nullptr;
 }
-#define ABS_HIL_NOT_THERE(function, ...)                                  \
-  fmi3Status function(fmi3Instance instance __VA_OPT__(, ) __VA_ARGS__) { \
-    return not_there(instance, fmi3Error, #function);                     \
-  }
-#define ABS_HIL_NO_VALUES(type)                                                              \
-  ABS_HIL_NOT_THERE(fmi3Get##type, const fmi3ValueReference[], size_t, fmi3##type[], size_t) \
-  ABS_HIL_NOT_THERE(fmi3Set##type, const fmi3ValueReference[], size_t, const fmi3##type[], size_t)
+#define ABS_HIL_NOT_THERE(function, ...) \
+  fmi3Status function(__VA_ARGS__) { return not_there(instance, fmi3Error, #function); }
+#define ABS_HIL_NO_VALUES(type)                                                                                     \
+  ABS_HIL_NOT_THERE(fmi3Get##type, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3##type[], size_t) \
+  ABS_HIL_NOT_THERE(fmi3Set##type, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3##type[],   \
+                    size_t)
 ABS_HIL_NO_VALUES(Float32)
 ABS_HIL_NO_VALUES(Int8)
 ABS_HIL_NO_VALUES(UInt8)
@@ -131,46 +130,53 @@ ABS_HIL_NO_VALUES(UInt16)
 ABS_HIL_NO_VALUES(UInt32)
 ABS_HIL_NO_VALUES(Int64)
 ABS_HIL_NO_VALUES(UInt64)
-ABS_HIL_NOT_THERE(fmi3EnterEventMode)
-ABS_HIL_NOT_THERE(fmi3GetBinary, const fmi3ValueReference[], size_t, size_t[], fmi3Binary[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetClock, const fmi3ValueReference[], size_t, fmi3Clock[])
-ABS_HIL_NOT_THERE(fmi3SetBinary, const fmi3ValueReference[], size_t, const size_t[], const fmi3Binary[], size_t)
-ABS_HIL_NOT_THERE(fmi3SetClock, const fmi3ValueReference[], size_t, const fmi3Clock[])
-ABS_HIL_NOT_THERE(fmi3GetNumberOfVariableDependencies, fmi3ValueReference, size_t*)
-ABS_HIL_NOT_THERE(fmi3GetVariableDependencies, fmi3ValueReference, size_t[], fmi3ValueReference[], size_t[],
-                  fmi3DependencyKind[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetDirectionalDerivative, const fmi3ValueReference[], size_t, const fmi3ValueReference[], size_t,
-                  const fmi3Float64[], size_t, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetAdjointDerivative, const fmi3ValueReference[], size_t, const fmi3ValueReference[], size_t,
-                  const fmi3Float64[], size_t, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3EnterConfigurationMode)
-ABS_HIL_NOT_THERE(fmi3ExitConfigurationMode)
-ABS_HIL_NOT_THERE(fmi3GetIntervalDecimal, const fmi3ValueReference[], size_t, fmi3Float64[], fmi3IntervalQualifier[])
-ABS_HIL_NOT_THERE(fmi3GetIntervalFraction, const fmi3ValueReference[], size_t, fmi3UInt64[], fmi3UInt64[],
-                  fmi3IntervalQualifier[])
-ABS_HIL_NOT_THERE(fmi3GetShiftDecimal, const fmi3ValueReference[], size_t, fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3GetShiftFraction, const fmi3ValueReference[], size_t, fmi3UInt64[], fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3SetIntervalDecimal, const fmi3ValueReference[], size_t, const fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3SetIntervalFraction, const fmi3ValueReference[], size_t, const fmi3UInt64[], const fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3SetShiftDecimal, const fmi3ValueReference[], size_t, const fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3SetShiftFraction, const fmi3ValueReference[], size_t, const fmi3UInt64[], const fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3EvaluateDiscreteStates)
-ABS_HIL_NOT_THERE(fmi3UpdateDiscreteStates, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*,
-                  fmi3Float64*)
-ABS_HIL_NOT_THERE(fmi3EnterContinuousTimeMode)
-ABS_HIL_NOT_THERE(fmi3CompletedIntegratorStep, fmi3Boolean, fmi3Boolean*, fmi3Boolean*)
-ABS_HIL_NOT_THERE(fmi3SetTime, fmi3Float64)
-ABS_HIL_NOT_THERE(fmi3SetContinuousStates, const fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetContinuousStateDerivatives, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetEventIndicators, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetContinuousStates, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetNominalsOfContinuousStates, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetNumberOfEventIndicators, size_t*)
-ABS_HIL_NOT_THERE(fmi3GetNumberOfContinuousStates, size_t*)
-ABS_HIL_NOT_THERE(fmi3EnterStepMode)
-ABS_HIL_NOT_THERE(fmi3GetOutputDerivatives, const fmi3ValueReference[], size_t, const fmi3Int32[], fmi3Float64[],
+ABS_HIL_NOT_THERE(fmi3EnterEventMode, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3GetBinary, fmi3Instance instance, const fmi3ValueReference[], size_t, size_t[], fmi3Binary[],
                   size_t)
-ABS_HIL_NOT_THERE(fmi3ActivateModelPartition, fmi3ValueReference, fmi3Float64)
+ABS_HIL_NOT_THERE(fmi3GetClock, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Clock[])
+ABS_HIL_NOT_THERE(fmi3SetBinary, fmi3Instance instance, const fmi3ValueReference[], size_t, const size_t[],
+                  const fmi3Binary[], size_t)
+ABS_HIL_NOT_THERE(fmi3SetClock, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3Clock[])
+ABS_HIL_NOT_THERE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference, size_t*)
+ABS_HIL_NOT_THERE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference, size_t[],
+                  fmi3ValueReference[], size_t[], fmi3DependencyKind[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference[], size_t,
+                  const fmi3ValueReference[], size_t, const fmi3Float64[], size_t, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference[], size_t,
+                  const fmi3ValueReference[], size_t, const fmi3Float64[], size_t, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3EnterConfigurationMode, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3ExitConfigurationMode, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Float64[],
+                  fmi3IntervalQualifier[])
+ABS_HIL_NOT_THERE(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3UInt64[],
+                  fmi3UInt64[], fmi3IntervalQualifier[])
+ABS_HIL_NOT_THERE(fmi3GetShiftDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3GetShiftFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3UInt64[],
+                  fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3SetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t,
+                  const fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3SetIntervalFraction, fmi3Instance instance, const fmi3ValueReference[], size_t,
+                  const fmi3UInt64[], const fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3UInt64[],
+                  const fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3EvaluateDiscreteStates, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3UpdateDiscreteStates, fmi3Instance instance, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*,
+                  fmi3Boolean*, fmi3Boolean*, fmi3Float64*)
+ABS_HIL_NOT_THERE(fmi3EnterContinuousTimeMode, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean, fmi3Boolean*, fmi3Boolean*)
+ABS_HIL_NOT_THERE(fmi3SetTime, fmi3Instance instance, fmi3Float64)
+ABS_HIL_NOT_THERE(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t*)
+ABS_HIL_NOT_THERE(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t*)
+ABS_HIL_NOT_THERE(fmi3EnterStepMode, fmi3Instance instance)
+ABS_HIL_NOT_THERE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference[], size_t,
+                  const fmi3Int32[], fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference, fmi3Float64)
 #undef ABS_HIL_NO_VALUES
 #undef ABS_HIL_NOT_THERE
 
