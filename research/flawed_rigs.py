@@ -33,6 +33,8 @@ FLAWS = {'fading': ('brake_fading_per_J', 1e-4, 4e-4), 'dead time': ('brake_dead
 OTHERS = {'two lags': ({'release': 1.5}, {'brake_release_ratio': 1.5}), 'bent map': ({'curvature': 0.2}, {'brake_curvature': 0.2}),
           'friction by sliding speed': ({'by_sliding_s_m': 0.02}, {'friction_fall_s_m': 0.02}),
           'friction by car speed': ({'by_speed_s_m': 0.01}, "changes with the lower wheel's speed"),
+          'bearings that warm up': ({'stiff': 0.6}, 'bearing drags less as time goes'),
+          'friction by Stribeck': ({'at_rest': 0.25}, 'the friction is no straight line of the sliding speed'),
           'unequal slots': ({'slots': 0.3}, {'upper_encoder_slot_error_counts': 0.3}),
           'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0},
                                {'brake_fading_per_J': 4e-4, 'brake_cooling_per_s': 0.25})}
@@ -42,7 +44,7 @@ KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc'
          'release', 'curved map', 'falling friction', 'release + curved map + fading', 'fading + cooling', 'slots',
          'quiet + slots')
 KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed', 'two lags + quiet',
-                   'friction by car speed', 'brake that cools', 'unequal slots')
+                   'friction by car speed', 'brake that cools', 'unequal slots', 'bearings that warm up', 'friction by Stribeck')
 
 
 def one(plant, kind, seed, keep=None):

@@ -14,18 +14,20 @@ import numpy as np
 WANDER = (0.01, 0.01, 0.005, 0.05, 0.05)
 WANDER_S = 0.2
 STEP_S = 5e-4
+STRIBECK_M_S = 3.0
 PER_COUNT_RAD = 2 * math.pi / 4096
 
 
 def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_sliding_s_m=0.0, by_speed_s_m=0.0,
-           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0):
+           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0, stiff=0.0, at_rest=0.0):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
     curvature: share of the straight map that a small torque lacks; by_sliding_s_m, by_speed_s_m: by how much of itself the
     friction falls for each m/s between the wheels' surfaces, and of the lower one; fading_per_J: share of the brake's
     torque lost for each joule in it, which leaves it over `cools_in_s`; slots: by how much of a count every second edge of the
-    upper disc comes late
+    upper disc comes late; stiff: by how much of itself more both bearings drag at first, which passes in 8 s; at_rest: share of
+    the friction that a sliding tyre loses, most of it within STRIBECK_M_S
     """
     v = values
     angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
@@ -35,17 +37,18 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
     places = int(log.time_s[-1] / WANDER_S) + 3
     factors = [1 + wander * sd * random.standard_normal(places) for sd in WANDER]
 
-    def rates(w1, w2, torque, hot, brake, motor, apart, factor):
+    def rates(w1, w2, torque, hot, drag, brake, motor, apart, factor):
         straight = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) if brake >= v['u0'] else 0.0
         target = straight * (1 + curvature * (straight / (v['b1_Nm'] + v['b2_Nm']) - 1)) * factor[1] * hot
         speed1, speed2 = v['r1_m'] * w1, v['r2_m'] * w2
         force, fastest = 0.0, max(abs(speed1), abs(speed2))
         if not apart and fastest > 0.02:
             theta = v['theta_N'] * factor[0] * (1 - by_sliding_s_m * abs(speed2 - speed1)) * (1 - by_speed_s_m * abs(speed2))
+            theta *= 1 - at_rest * (1 - math.exp(-abs(speed2 - speed1) / STRIBECK_M_S))
             force = theta * math.sin(v['C'] * math.atan(v['B'] * (speed2 - speed1) / fastest))
         drive = v['motor_stall_torque_Nm'] * factor[2] * motor * (1 - w2 / v['motor_no_load_speed_rad_s'])
-        held1 = torque + factor[3] * (v['M10_Nm'] + v['d1_Nms_rad'] * w1)
-        held2 = factor[4] * (v['M20_Nm'] + v['d2_Nms_rad'] * w2)
+        held1 = torque + drag * factor[3] * (v['M10_Nm'] + v['d1_Nms_rad'] * w1)
+        held2 = drag * factor[4] * (v['M20_Nm'] + v['d2_Nms_rad'] * w2)
         push1, push2 = v['r1_m'] * force, drive - v['r2_m'] * force
         return (0.0 if w1 <= 1e-9 and push1 <= held1 else (push1 - held1) / v['J1_kg_m2'],
                 0.0 if w2 <= 1e-9 and push2 <= held2 else (push2 - held2) / v['J2_kg_m2'],
@@ -65,11 +68,12 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
         acts = log.brake_pwm[row], log.motor_pwm[row], log.wheels_apart[row] != 0, factor
         for _ in range(steps):
             hot = math.exp(-fading_per_J * heat_J)
+            drag = 1 + stiff * math.exp(-log.time_s[row] / 8.0)
             heat_J += h * (torque * w1 - heat_J / cools_in_s)
-            a = rates(w1, w2, torque, hot, *acts)
+            a = rates(w1, w2, torque, hot, drag, *acts)
             # A held wheel must not creep back by what the rule's half step overshoots.
             half1, half2 = max(0.0, w1 + 0.5 * h * a[0]), max(0.0, w2 + 0.5 * h * a[1])
-            b = rates(half1, half2, torque + 0.5 * h * a[2], hot, *acts)
+            b = rates(half1, half2, torque + 0.5 * h * a[2], hot, drag, *acts)
             angle1, angle2 = angle1 + h * half1, angle2 + h * half2
             w1, w2, torque = max(0.0, w1 + h * b[0]), max(0.0, w2 + h * b[1]), max(0.0, torque + h * b[2])
     return dataclasses.replace(log, counts=counts - counts[0], first_counts=counts[0])

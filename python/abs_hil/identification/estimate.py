@@ -9,7 +9,7 @@ from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
-from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
+from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
 from .linear import run_filter, step
 from .logs import Log, load_log, motion_of
 from .parameters import ALL_FORMS, FORMS, WHEELS, checked_keys
@@ -93,7 +93,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         return interrupted(fit, str(start), notes)
     of_logs = list(notes)
     found = assembled(finished, str(start), notes)
-    name_disagreement(found)
+    found.disagreement = disagreement(finished.fit)
     if why := _doubt(found, finished):
         causes = finished.causes or finished.hidden
         off = (causes[0].cause.acts if causes else
@@ -130,9 +130,8 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     say(f'{fit.problem.form.meaning}: fit')
     # Without disturbances a fit to the logs of a rig that wanders may go anywhere: the other one begins where this one does.
     undisturbed = _undisturbed(fit.copy(), check, say)
-    if undisturbed is None or not undisturbed.rms_counts <= LARGEST_QUIET_RMS:
-        left = f'residual {undisturbed.rms_counts:.3g} counts RMS' if undisturbed is not None else 'no fit without disturbances'
-        say(f'{left}: the rig wanders, or the model lacks something')
+    if undisturbed is None or (left := _left_by(undisturbed)):
+        say(f'{left if undisturbed else "no fit without disturbances"}: the rig wanders, or the model lacks something')
         try:
             fit, first_causes, cost = _explained_first(fit, check, say)
             fit = disturbed_fit(fit, check, say)
@@ -155,8 +154,19 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     fit, round_discs = intervals.settle_discs(fit, disturbances, check)
     gaps = likely_u0(fit, disturbances, check)
     say('intervals')
-    spread = intervals.bootstrap(fit, seed, check=check) if disturbances is QUIET else intervals.information(fit)
+    if disturbances is QUIET:
+        spread = intervals.bootstrap(fit, seed, check=check)
+    else:
+        spread = intervals.information(fit, structure.unsettled(fit, disturbances))
     return Finished(fit, spread, gaps, None if disturbances is QUIET else disturbances, round_discs, causes, first_causes, cost)
+
+
+def _left_by(undisturbed: Fit) -> str:
+    """What says that more than the counts' steps disturbed the rig; empty if nothing does."""
+    if not undisturbed.rms_counts <= LARGEST_QUIET_RMS:
+        return f'residual {undisturbed.rms_counts:.3g} counts RMS'
+    most = max(disagreement(undisturbed).values(), default=0.0)
+    return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
 
 
 def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:

@@ -264,13 +264,13 @@ def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
     return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
 
 
-def name_disagreement(found: Identified) -> None:
-    """Compares each log with all of them: the score of one log at the joint estimate."""
-    fit = found.fit
-    if len(found.logs) == 1:
-        return
+def disagreement(fit: Fit) -> dict[str, float]:
+    """Of each log against all of them, by its name: the score of the log alone at the joint estimate, as chi-square over its
+    degrees of freedom. Empty for one log."""
+    out: dict[str, float] = {}
+    logs = fit.problem.logs
     inverse = fit.covariance()
-    for log, Nl, nl in zip(found.logs, fit.normal, fit.right):
+    for log, Nl, nl in zip(logs, fit.normal, fit.right) if len(logs) > 1 else ():
         told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
         d = 1 / np.sqrt(np.diag(Nl)[told])
         covariance = (Nl - Nl @ inverse @ Nl)[np.ix_(told, told)] * np.outer(d, d)
@@ -278,4 +278,5 @@ def name_disagreement(found: Identified) -> None:
         kept = values > 1e-3  # what the log has in common with others; the rest is its own, and rounding
         if kept.any():
             z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
-            found.disagreement[log.name] = float(z @ z / kept.sum())
+            out[log.name] = float(z @ z / kept.sum())
+    return out

@@ -61,8 +61,9 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter)
 
 
-def information(fit: Fit) -> Spread:
-    return Spread(fit.covariance(), fit.covariance())
+def information(fit: Fit, more: np.ndarray) -> Spread:
+    """Spread by the filter's information, and by `more` (structure.unsettled)."""
+    return Spread(fit.covariance() + more, fit.covariance() + more)
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:

@@ -7,7 +7,7 @@ follow, are one more column of the fit. Its coefficient c and standard deviation
 disturbances as noise and all parameters free: |c| / s is about 1 for a rig that wanders at random, whatever the cause.
 """
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from .problem import DISTURBANCES, Disturbances, Fit, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
 SURE = 5.0
+#: a cause that there is may be this sure
+MOST_SURE = 10.0
 #: a flaw is tried in place of a surer cause if it is this share as sure, and taken if that cause is then half as sure
 WORTH_A_TRY = 0.3
 STILL_THERE = 0.5
@@ -71,6 +73,7 @@ CAUSES = (
     Cause("the brake's torque changes with the upper wheel's speed", 'per rad/s', 'brake', lambda s: s.omega_rad_s[:, 0]),
     Cause('the friction falls with the sliding speed', 'per m/s', 'road', lambda s: -s.sliding_m_s, FRICTION_FALL.key,
           'the friction rises with the sliding speed'),
+    Cause('the friction is no straight line of the sliding speed', 'per (m/s)^2', 'road', lambda s: s.sliding_m_s**2),
     Cause("the friction changes with the lower wheel's speed", 'per rad/s', 'road', lambda s: s.omega_rad_s[:, 1]),
     Cause('the friction changes with time', 'per s', 'road', lambda s: s.log.time_s - s.log.time_s[0]),
     *(Cause(words.format(wheel), 'of itself', acts,
@@ -83,6 +86,11 @@ CAUSES = (
     *(Cause('the motor gets weaker with its use', f'per s of full duty, over {recovers_s:g} s', 'motor',
             lambda s, leaves=1.0 / recovers_s: -leaky(s.log, leaves, s.log.motor_pwm), '',  # type: ignore[misc]
             'the motor gets stronger with its use') for recovers_s in (3.0, 10.0, 30.0)),
+    Cause("the motor's torque is no straight line of its speed", 'per (rad/s)^2', 'motor', lambda s: s.omega_rad_s[:, 1]**2),
+    Cause("the motor's torque is no straight line of its duty", 'per duty', 'motor', lambda s: s.log.motor_pwm - 1.0),
+    *(Cause(f"the {wheel} wheel's bearing drags more as time goes", 'N m per s', f'{wheel} bearing',
+            lambda s: s.log.time_s - s.log.time_s[0], '', f"the {wheel} wheel's bearing drags less as time goes")
+      for wheel in WHEELS),
     *(Cause(f"the {wheel} wheel's bearing drags with the square of its speed", 'N m s^2', f'{wheel} bearing',
             lambda s, at=at: s.omega_rad_s[:, at]**2) for at, wheel in enumerate(WHEELS)),  # type: ignore[misc]
 )
@@ -90,13 +98,20 @@ CAUSES = (
 
 @dataclass
 class Found:
-    """A cause with its coefficient; sure: what it takes off -2 log likelihood, as a number of standard deviations; that
-    with the share of the disturbances that is likeliest with it; rest: how sure the surest of the others is beside it."""
+    """A cause with its coefficient; sure: what it takes off -2 log likelihood, as a number of standard deviations; that with
+    the share of the disturbances that is likeliest with it; moves: how it would move the free parameters' scaled values, with
+    the disturbances as they are, and their errors (see _moves); beside: of the surest one, the surest of the others with it."""
     cause: Cause
     coefficient: float
     sure: float
     share: float
-    rest: float = 0.0
+    beside: 'Found | None' = None
+    moves: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
+
+    @property
+    def rest(self) -> float:
+        """How sure the surest of the others is beside it."""
+        return self.beside.sure if self.beside else 0.0
 
     @property
     def words(self) -> str:
@@ -130,13 +145,13 @@ def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
     def found(cause: Cause, at: np.ndarray, beside: np.ndarray, costs: Sequence[float]) -> Found:
         gain, x, share = max((gain - cost, x, share) for one, share, cost in zip(equations, SHARES, costs)
                              for x, gain in (_gain(*one, beside, at),))
-        return Found(cause, x, float(np.sqrt(max(gain, 0.0))), share)
+        return Found(cause, x, float(np.sqrt(max(gain, 0.0))), share, moves=_moves(*equations[0], free, at))
     of = [(found(cause, at, free, more), at) for cause, at in shown if at.size]
     of.sort(key=lambda one: -one[0].sure)
     for surest, beside in of[:1]:
         with_it = [cost - _gain(*one, free, beside)[1] for one, cost in zip(equations, more)]
         beside, more = np.append(free, beside), [cost - min(with_it) for cost in with_it]
-        surest.rest = max((found(one.cause, at, beside, more).sure for one, at in of[1:]), default=0.0)
+        surest.beside = max((found(one.cause, at, beside, more) for one, at in of[1:]), key=lambda one: one.sure, default=None)
     return [one for one, _ in of]
 
 
@@ -150,6 +165,31 @@ def _gain(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> t
     x, own = (covariance @ n[chosen])[-at.size:], covariance[-at.size:, -at.size:]
     size = x[0] if at.size == 1 else np.hypot(x[::2], x[1::2]).max()
     return float(size), float(x @ np.linalg.solve(own, x)) - 2.0 * (at.size - 1)
+
+
+def _moves(N: np.ndarray, n: np.ndarray, free: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """M, (parameters at `free`, 1 + columns at `at`): M M' is how far the solution for those parameters moves when these
+    columns join it, squared, and what their errors add to its covariance."""
+    towards = inverse(N[np.ix_(free, free)]) @ np.column_stack([n[free], N[np.ix_(free, at)]])
+    covariance = inverse(N[np.ix_(at, at)] - N[np.ix_(at, free)] @ towards[:, 1:])
+    coefficients = covariance @ (n[at] - N[np.ix_(at, free)] @ towards[:, 0])
+    return np.asarray(towards[:, 1:] @ np.column_stack([coefficients, np.linalg.cholesky(covariance)]))
+
+
+def unsettled(fit: Fit, disturbances: Disturbances) -> np.ndarray:
+    """What the causes that nobody can be sure of add to the covariance of the free parameters' scaled changes.
+
+    The estimates are those without any cause. Averaged over "no cause" and each of the K causes alone, their second moment
+    grows by the sum of w_k M_k M_k' (see _moves), w_k the cause's probability: odds of 1 / K before the logs, times the Bayes
+    factor exp(z^2 t^2 / (2 (1 + t^2))) / sqrt(1 + t^2) of a cause that is sure by z standard deviations and may be by t = 10
+    (Hoeting et al. 1999, Bayesian model averaging)."""
+    causes, free = causes_of(fit, disturbances), np.ix_(fit.free, fit.free)
+    out, total = np.zeros((len(fit.scale),) * 2), 1.0
+    for one in causes:
+        odds = np.exp(0.5 * one.sure**2 * MOST_SURE**2 / (1.0 + MOST_SURE**2)) / np.sqrt(1.0 + MOST_SURE**2) / len(causes)
+        out[free] += odds * (one.moves @ one.moves.T)
+        total += odds
+    return out / total
 
 
 def _signals(fit: Fit) -> list[Signals]:
@@ -213,7 +253,9 @@ def explained(fit: Fit, disturbances: Disturbances, check: Callable[[], None],
         check()
         causes = causes_of(fit, disturbances)
         left = [one for one in causes if one.sure > SURE]
-        better = _with_a_flaw(fit, causes, disturbances, check) if left else None
+        if causes and not left and causes[0].beside and causes[0].rest > SURE:
+            left = [causes[0], causes[0].beside]  # each alone hides the other
+        better = _with_a_flaw(fit, left, disturbances, check) if left else None
         if better is None:
             return fit, left
         fit, taken = better
@@ -224,7 +266,7 @@ def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
                  check: Callable[[], None]) -> tuple[Fit, Cause] | None:
     surest = causes[0]
     for one in causes:
-        if not one.flaw or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
+        if not one.flaw or one.sure < WORTH_A_TRY * surest.sure:
             continue
         flawed = _with_flaw(fit, one, disturbances, check)
         if flawed is not None and (one is surest or all(other.cause is not surest.cause or other.sure < STILL_THERE * surest.sure
@@ -243,7 +285,8 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     less = disturbances.times(found.share)
     to_rest(flawed, less, 6, check)
     with_it, without = _against(flawed, less, key), min(_against(fit, disturbances.times(share)) for share in {1.0, found.share})
-    return flawed if with_it[0] < without[0] - SURE**2 and sum(with_it) < sum(without) else None
+    least = SURE**2 if found.sure > SURE else 0.0  # one that another hides is sure with that one only
+    return flawed if with_it[0] < without[0] - least and sum(with_it) < sum(without) else None
 
 
 def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> tuple[float, float]:
