@@ -232,5 +232,6 @@ def test_a_cause_that_was_tried_or_leaves_others_is_not_stated(monkeypatch):
     assert 'plant.friction_fall_s_m, plant.brake_dead_time_s: tried, and no explanation' in said
     rises = structure.Found(falls, -0.02, 31.0, 1.0)  # the plant cannot have that: nothing was tried
     assert 'plant: the friction rises' in structure.sentence([rises], None)
-    assert 'as if the friction changes' in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, structure.Found(acts_late, 1e-3, 20.0, 1.0))], None)
-    assert 'plant: the friction changes' in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, structure.Found(acts_late, 1e-3, 3.0, 1.0))], None)
+    for words, beside in (('as if the friction changes', 20.0), ('plant: the friction changes', 3.0)):
+        late = structure.Found(acts_late, 1e-3, beside, 1.0)
+        assert words in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, late)], None)

@@ -286,7 +286,8 @@ def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callab
     to_rest(flawed, less, 6, check)
     with_it, without = _against(flawed, less, key), min(_against(fit, disturbances.times(share)) for share in {1.0, found.share})
     least = SURE**2 if found.sure > SURE else 0.0  # one that another hides is sure with that one only
-    return flawed if with_it[0] < without[0] - least and sum(with_it) < sum(without) else None
+    noise = 2.0 * found.sure  # one standard deviation of what the logs left out say of a cause that is this sure
+    return flawed if with_it[0] < without[0] - least and sum(with_it) < sum(without) + noise else None
 
 
 def _against(fit: Fit, disturbances: Disturbances, doubted: str = '') -> tuple[float, float]:
