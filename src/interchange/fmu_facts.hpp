@@ -4,10 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
-
-#include "abs_hil/interchange/controller.h"
 
 namespace abs_hil::interchange {
 
@@ -26,12 +23,6 @@ class ExtractedFmu {
 
  private:
   std::filesystem::path folder_{};
-};
-
-/// A quantity of ours that a variable of an FMU may carry.
-struct CarriedQuantity {
-  std::string_view name;
-  std::size_t offset;  ///< in abs_hil_input or abs_hil_output
 };
 
 /// A variable of an FMU that carries one of our quantities, or a parameter with its value.
