@@ -20,14 +20,8 @@
 
 namespace abs_hil::telemetry {
 
-/// Description of the run, for ABS_EXPERIMENT.
-struct ExperimentInfo {
-  std::string experiment;
-  std::string controller;
-  std::string plant;
-  std::string backend;
-  std::string config_json;  ///< effective configuration
-  std::string version;
+/// Description of the run: what ABS_EXPERIMENT says, and names.
+struct ExperimentInfo : experiment_t {
   rig::RunNames names{};  ///< of phases and signals, for events and telemetry
 };
 
@@ -96,17 +90,17 @@ class MessageStream : public rig::RecordSink {
   StreamOptions options_;
   StatusSource status_;
   std::vector<Outlet*> outlets_;
-  Channel telemetry_;
-  Channel adjustment_;
-  Channel command_state_;
-  Channel status_channel_;
-  Channel event_;
-  Channel experiment_;
-  std::string command_channel_;
-  experiment_t experiment_message_{};
+  Channel telemetry_{options_.channel_prefix + "TELEMETRY"};
+  Channel adjustment_{options_.channel_prefix + "ADJUSTMENT"};
+  Channel command_state_{options_.channel_prefix + "COMMAND_STATE"};
+  Channel status_channel_{options_.channel_prefix + "STATUS"};
+  Channel event_{options_.channel_prefix + "EVENT"};
+  Channel experiment_{options_.channel_prefix + "EXPERIMENT"};
+  std::string command_channel_{options_.channel_prefix + "COMMAND"};
   telemetry_t telemetry_message_{};
   rig::RunNames names_;
   EventDetector detector_;
+  experiment_t experiment_message_;
   EncodeBuffer buffer_;
   rig::CycleRecord latest_{};
   std::uint64_t next_telemetry_cycle_{0};
