@@ -22,6 +22,8 @@ class ExtractedFmu {
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
  private:
+  ExtractedFmu();  ///< an empty folder
+
   std::filesystem::path folder_{};
 };
 

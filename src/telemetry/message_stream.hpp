@@ -13,10 +13,10 @@
 #include "abs_hil/status_t.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
+#include "rig/timing_summary.hpp"
 #include "telemetry/events.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/outlet.hpp"
-#include "telemetry/status_snapshot.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -24,6 +24,20 @@ namespace abs_hil::telemetry {
 struct ExperimentInfo : experiment_t {
   rig::RunNames names{};  ///< of phases and signals, for events and telemetry
 };
+
+/// Data from the owner of the run for ABS_STATUS and the status line. All counts are since the start.
+struct StatusSnapshot {
+  std::uint64_t cycles{0};
+  std::uint64_t telemetry_drops{0};     ///< records that found the ring full
+  std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
+  /// Share of the time in which the gate's checks could not judge; NaN: not known.
+  double checks_unjudged{rig::unknown};
+  bool realtime{false};  ///< real-time scheduling and locked memory are in force
+  rig::TimingSummary timing{};
+};
+
+/// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.
+using StatusSource = std::function<StatusSnapshot()>;
 
 /// Channel prefix and rates of the messages.
 struct StreamOptions {
