@@ -1,4 +1,4 @@
-// Ranges and allowed names of options in words, and which values weaken a limit.
+// Ranges, allowed names and safety classes of options, in words.
 #include "abs_hil/rig/option.hpp"
 
 #include <charconv>
@@ -39,19 +39,6 @@ bool AllowedNames::contains(std::string_view name) const noexcept {
     if (at(index) == name) return true;
   }
   return false;
-}
-
-bool SafetyClass::weakened_by(double value) const noexcept {
-  switch (kind) {
-    case Kind::above: return value > bound;
-    case Kind::below: return value < bound;
-    case Kind::unless: return value != bound;
-    default: return false;
-  }
-}
-
-bool SafetyClass::weakened_by(std::string_view value) const noexcept {
-  return (kind == Kind::unless && value != text) || (kind == Kind::text && value == text);
 }
 
 std::string SafetyClass::in_words(std::string_view unit) const {
