@@ -104,12 +104,11 @@ std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
   for (const char* folder : platform_folders) {
     if (libraries.contains(fs::path(folder).parent_path().filename().string())) return wanted;
   }
-  std::string others;
-  for (const std::string& platform : libraries) others.append(others.empty() ? "" : ", ").append(platform);
-  refuse(file, others.empty()
+  refuse(file, libraries.empty()
                    ? "it has no binaries; compile it with its sources in the tool that made it"
                    : fmt::format("it has libraries for {} only, not for this computer ({}); export it for Linux",
-                                 others, fs::path(platform_folders[0]).parent_path().filename().string()));
+                                 fmt::join(libraries, ", "),
+                                 fs::path(platform_folders[0]).parent_path().filename().string()));
 }
 
 void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs::path& to) {

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <pugixml.hpp>
+#include <ranges>
 #include <set>
 
 #include "interchange/foreign_controller.hpp"
@@ -112,9 +113,8 @@ void link(const fs::path& file, const TheirVariables& variables, const toml::tab
   const auto find = [&](std::string_view name) { return std::ranges::find(ours, name, &CarriedQuantity::name); };
   const bool inputs = std::string_view(causality) == "input";
   const auto known = [&] {
-    std::string all;
-    for (const CarriedQuantity& q : ours) all.append(all.empty() ? "" : ", ").append(q.name);
-    return all + (inputs ? ", start (it keeps its start value)" : "");
+    return fmt::format("{}{}", fmt::join(ours | std::views::transform(&CarriedQuantity::name), ", "),
+                       inputs ? ", start (it keeps its start value)" : "");
   };
   std::set<std::string_view> named;
   if (names != nullptr) {

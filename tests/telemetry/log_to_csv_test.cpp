@@ -34,8 +34,8 @@ void put(const fs::path& path, const std::string& bytes) { std::ofstream(path, s
 void record(const fs::path& log_path, const fs::path& csv_path, std::uint64_t cycles = 1200) {
   LogOutlet log(log_path, 1'000'000);
   CsvSink csv(csv_path);
-  MessageStream stream({}, {"paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"},
-                       {});
+  MessageStream stream(
+      {}, {{0, 0, "paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"}}, {});
   stream.add(log);
   for (std::uint64_t n = 0; n < cycles; ++n) {
     rig::CycleRecord r = test::sample_record(n);
