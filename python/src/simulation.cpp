@@ -21,7 +21,6 @@
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
-#include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "abs_hil/rig/tyre_curve.hpp"
-#include "analysis/json_number.hpp"
+#include "analysis/run_summary.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::analysis {

@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "analysis/json_number.hpp"
-
 namespace abs_hil::analysis {
 
 namespace {

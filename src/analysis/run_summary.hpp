@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -9,6 +10,11 @@
 #include "rig/timing_summary.hpp"
 
 namespace abs_hil::analysis {
+
+/// A number as JSON; null for NaN and infinity, which JSON lacks.
+[[nodiscard]] inline nlohmann::ordered_json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
 
 /// The contents of a run's summary.
 struct RunSummary {

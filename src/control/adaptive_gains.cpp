@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
+#include <unsupported/Eigen/KroneckerProduct>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/option_check.hpp"
@@ -19,17 +20,6 @@ bool is_positive_definite(const Eigen::Matrix2d& M) {
   return M.allFinite() && cholesky.info() == Eigen::Success;
 }
 
-/// Left factor (x) right factor.
-Eigen::Matrix4d kronecker(const Eigen::Matrix2d& left, const Eigen::Matrix2d& right) {
-  Eigen::Matrix4d product;
-  for (Eigen::Index row = 0; row < 2; ++row) {
-    for (Eigen::Index column = 0; column < 2; ++column) {
-      product.block<2, 2>(2 * row, 2 * column) = left(row, column) * right;
-    }
-  }
-  return product;
-}
-
 }  // namespace
 
 Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& Q) {
@@ -41,7 +31,8 @@ Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& 
   }
   // With vec() stacking columns, vec(P A) = (A' (x) I) vec(P) and vec(A' P) = (I (x) A') vec(P).
   const Eigen::Matrix2d identity = Eigen::Matrix2d::Identity();
-  const Eigen::Matrix4d map = kronecker(A.transpose(), identity) + kronecker(identity, A.transpose());
+  Eigen::Matrix4d map = Eigen::kroneckerProduct(A.transpose(), identity);
+  map += Eigen::kroneckerProduct(identity, A.transpose()).eval();
   const Eigen::Vector4d right_side = -2.0 * Eigen::Map<const Eigen::Vector4d>(Q.data());
   const Eigen::Vector4d solution = map.fullPivLu().solve(right_side);
 

@@ -52,7 +52,6 @@ class AdaptiveOptimalLaw {
   static constexpr bool estimates_theta = true;
 
   AdaptiveOptimalLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit AdaptiveOptimalLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;

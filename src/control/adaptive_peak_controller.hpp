@@ -22,7 +22,6 @@ class AdaptivePeakLaw {
   static constexpr bool estimates_theta = true;
 
   AdaptivePeakLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit AdaptivePeakLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;

@@ -67,7 +67,6 @@ class BrakingStiffnessLaw {
   static constexpr bool estimates_theta = false;
 
   BrakingStiffnessLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit BrakingStiffnessLaw(const ControllerContext& context);
 
   void reset(const BasicSlipInput<S>& input) noexcept;

@@ -98,7 +98,6 @@ class PiLaw {
   static constexpr bool estimates_theta = false;
 
   PiLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit PiLaw(const ControllerContext& context)
       : laws_{paper::laws(context.rig.wheels)},
         kp_per_s_{-std::expm1(-context.options.pi.kp_per_s / context.options.rate_Hz) * context.options.rate_Hz},
@@ -139,7 +138,6 @@ class MixedSlipDecelerationLaw {
   static constexpr bool estimates_theta = false;
 
   MixedSlipDecelerationLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit MixedSlipDecelerationLaw(const ControllerContext& context)
       : laws_{paper::laws(context.rig.wheels)},
         brake_{context.rig.brake},

@@ -10,13 +10,12 @@ namespace abs_hil::control {
 
 /// The slip controller of a law that is written over its scalar: `Law<double>` runs in the cycle, a `Law` of packs in
 /// many simulated runs side by side. A law has `reset` and `step` as SlipController has them, `take_over` if it can,
-/// and nothing but scalars of type S as members. Only a `Law<double>` is made from a context. With signals of its own
-/// it has the table `signals`, and `show`, which writes their values into an output of `step`; `learnt` if a braking
-/// leaves something.
+/// and nothing but scalars of type S as members. Only a `Law<double>` is made from a context; its constructor throws
+/// std::invalid_argument for options out of range. With signals of its own it has the table `signals`, and `show`,
+/// which writes their values into an output of `step`; `learnt` if a braking leaves something.
 template <template <class> class Law>
 class LawController : public SlipController {
  public:
-  /// Throws what the law's constructor throws.
   explicit LawController(const ControllerContext& context) : law_{context} {}
 
   void reset(const SlipInput& input) noexcept override { law_.reset(input); }

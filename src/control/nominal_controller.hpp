@@ -17,7 +17,6 @@ class NominalLaw {
   static constexpr bool estimates_theta = true;
 
   NominalLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit NominalLaw(const ControllerContext& context)
       : laws_{paper::laws(context.rig.wheels)},
         tyre_{context.rig.tyre},

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <ranges>
 #include <stdexcept>
 #include <vector>
 
@@ -67,11 +68,10 @@ std::string unknown_name_message(std::string_view name) {
     return "controller " + std::string(name) +
            ": give a class in Python as MODULE:CLASS, with letters, digits and _ in both names; MODULE may have dots";
   }
-  const auto nearest = std::ranges::min_element(
-      table(), {}, [name](const ControllerEntry& entry) { return rig::edit_distance(name, entry.name); });
-  std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" + std::string(nearest->name) +
-                        "'? Known controllers:";
-  for (const ControllerEntry& entry : table()) message += " " + std::string(entry.name);
+  const auto names = table() | std::views::transform(&ControllerEntry::name);
+  std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" +
+                        std::string(rig::nearest_name(name, names)) + "'? Known controllers:";
+  for (const std::string_view known : names) message.append(" ").append(known);
   return message;
 }
 
@@ -80,9 +80,7 @@ std::string unknown_name_message(std::string_view name) {
 OwnOptions::OwnOptions() {
   for (const ControllerEntry& entry : table()) {
     if (entry.own_options == nullptr) continue;
-    std::string section(entry.name);
-    std::ranges::replace(section, '-', '_');
-    options_.emplace_back(section + '.', entry.own_options());
+    options_.emplace_back(section_of(entry.name).substr(std::size("control.") - 1), entry.own_options());
   }
 }
 

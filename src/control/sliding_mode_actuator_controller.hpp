@@ -24,7 +24,6 @@ class SlidingModeActuatorLaw {
   static constexpr bool estimates_theta = true;
 
   SlidingModeActuatorLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeActuatorLaw(const ControllerContext& context)
       : laws_{paper::laws(context.rig.wheels)},
         tyre_{context.rig.tyre},

@@ -19,7 +19,6 @@ class SlidingModeLaw {
   static constexpr bool estimates_theta = true;
 
   SlidingModeLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeLaw(const ControllerContext& context)
       : surface_{context, context.options.sliding_mode.adaptation},
         gain_m_s2_{context.options.sliding_mode.gain_m_s2},
@@ -76,7 +75,6 @@ class SmoothSlidingModeLaw {
   static constexpr bool estimates_theta = true;
 
   SmoothSlidingModeLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit SmoothSlidingModeLaw(const ControllerContext& context)
       : surface_{context, context.options.sliding_mode_smooth.adaptation},
         gain_m_s2_{context.options.sliding_mode_smooth.gain_m_s2},
@@ -135,7 +133,6 @@ class SuperTwistingLaw {
   static constexpr bool estimates_theta = true;
 
   SuperTwistingLaw() = default;
-  /// Throws std::invalid_argument for options out of range.
   explicit SuperTwistingLaw(const ControllerContext& context)
       : surface_{context, context.options.super_twisting.adaptation},
         k1_{context.options.super_twisting.k1},

@@ -45,6 +45,8 @@ class ResultFile {
   ~ResultFile();
 
   void append(std::string_view bytes);
+  /// Bytes that can be appended before it has to write.
+  [[nodiscard]] std::size_t room() const noexcept { return buffer_bytes - buffer_.size(); }
   /// Passes everything on to the operating system.
   void flush();
   /// Puts the file in its place before it is whole: the record of a run that has begun survives the program's death.

@@ -134,15 +134,16 @@ std::string to_json(const LaunchConfig& config) {
 
 LaunchConfig parse_launch_config(const std::string& json) try {
   const nlohmann::json object = rig::parse_json(json);
-  return {.run = {.experiment = object.at("experiment"),
-                  .controller = object.at("controller"),
-                  .plant = object.at("plant"),
-                  .backend = object.at("backend"),
-                  .config_json = object.at("config_json"),
-                  .version = object.at("version"),
-                  .names = {.signals = object.at("signals")}},
-          .realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
-          .record_prefix = object.at("record_prefix")};
+  LaunchConfig config{.realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
+                      .record_prefix = object.at("record_prefix")};
+  object.at("experiment").get_to(config.run.experiment);
+  object.at("controller").get_to(config.run.controller);
+  object.at("plant").get_to(config.run.plant);
+  object.at("backend").get_to(config.run.backend);
+  object.at("config_json").get_to(config.run.config_json);
+  object.at("version").get_to(config.run.version);
+  object.at("signals").get_to(config.run.names.signals);
+  return config;
 } catch (const nlohmann::json::exception& error) {
   throw std::runtime_error(std::string("guardian: not a launch configuration: ") + error.what());
 }

@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include "interchange/host.hpp"
@@ -272,12 +273,10 @@ std::string confine(int socket) {
 }
 
 const char* name_of_forbidden(std::int32_t number) noexcept {
-  const auto is_it = [number](const SystemCall& call) { return call.number == static_cast<std::uint32_t>(number); };
-  for (const SystemCall& call : forbidden) {
-    if (is_it(call)) return call.name;
-  }
-  for (const SystemCall& call : forbidden_in_part) {
-    if (is_it(call)) return call.name;
+  for (const std::span<const SystemCall> calls : {std::span<const SystemCall>(forbidden), {forbidden_in_part}}) {
+    for (const SystemCall& call : calls) {
+      if (call.number == static_cast<std::uint32_t>(number)) return call.name;
+    }
   }
   return "another one";
 }

@@ -104,12 +104,11 @@ std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
   for (const char* folder : platform_folders) {
     if (libraries.contains(fs::path(folder).parent_path().filename().string())) return wanted;
   }
-  std::string others;
-  for (const std::string& platform : libraries) others.append(others.empty() ? "" : ", ").append(platform);
-  refuse(file, others.empty()
+  refuse(file, libraries.empty()
                    ? "it has no binaries; compile it with its sources in the tool that made it"
                    : fmt::format("it has libraries for {} only, not for this computer ({}); export it for Linux",
-                                 others, fs::path(platform_folders[0]).parent_path().filename().string()));
+                                 fmt::join(libraries, ", "),
+                                 fs::path(platform_folders[0]).parent_path().filename().string()));
 }
 
 void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs::path& to) {
@@ -192,7 +191,14 @@ void check_count(const fs::path& file) {
 
 }  // namespace
 
-ExtractedFmu::ExtractedFmu(const fs::path& file) {
+ExtractedFmu::ExtractedFmu() {
+  std::string name = (fs::temp_directory_path() / "abs_hil_fmu.XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(fmt::format("{}: {}", name, std::strerror(errno)));
+  folder_ = name;
+}
+
+// A constructor that ends by an exception after the other one has returned calls the destructor.
+ExtractedFmu::ExtractedFmu(const fs::path& file) : ExtractedFmu() {
   // What is no file is not read: a folder cannot be, and a pipe would keep the program waiting.
   if (fs::exists(file) && !fs::is_regular_file(file)) refuse(file, "not an FMU: it is no regular file");
   check_count(file);
@@ -206,21 +212,12 @@ ExtractedFmu::ExtractedFmu(const fs::path& file) {
     refuse(file, "not an FMU: it cannot be read as a zip archive: " + text);
   }
   const std::vector<Entry> entries = entries_of(file, archive.get());
-  std::string name = (fs::temp_directory_path() / "abs_hil_fmu.XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(fmt::format("{}: {}", name, std::strerror(errno)));
-  folder_ = name;
-  try {
-    // The description first: what it shows to be hostile is refused before the rest is unpacked.
-    const auto description = std::ranges::find(entries, description_name, &Entry::name);
-    extract(file, archive.get(), *description, folder_ / description_name);
-    check_description(file, folder_ / description_name);
-    for (const Entry& entry : entries) {
-      if (entry.name != description_name) extract(file, archive.get(), entry, folder_ / entry.name);
-    }
-  } catch (...) {
-    std::error_code error;
-    fs::remove_all(folder_, error);
-    throw;
+  // The description first: what it shows to be hostile is refused before the rest is unpacked.
+  const auto description = std::ranges::find(entries, description_name, &Entry::name);
+  extract(file, archive.get(), *description, folder_ / description_name);
+  check_description(file, folder_ / description_name);
+  for (const Entry& entry : entries) {
+    if (entry.name != description_name) extract(file, archive.get(), entry, folder_ / entry.name);
   }
 }
 

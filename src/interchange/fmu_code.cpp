@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <memory>
 
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
@@ -79,35 +80,33 @@ class Instance2 {
  public:
   Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
     const std::string uri = "file://" + resources;
-    instance_ = instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), uri.c_str(), &callbacks_, fmi2False,
-                             fmi2False);
-  }
-  Instance2(const Instance2&) = delete;
-  Instance2& operator=(const Instance2&) = delete;
-  ~Instance2() {
-    if (instance_ != nullptr) free_(instance_);
+    instance_.reset(instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), uri.c_str(), &callbacks_,
+                                 fmi2False, fmi2False));
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value); }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value); }
+  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_.get(), &r, 1, &value); }
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_.get(), &r, 1, &value); }
   [[nodiscard]] Called set_flag(std::uint32_t r, bool flag) const {
     const fmi2Boolean value = flag ? fmi2True : fmi2False;
-    return set_flag_(instance_, &r, 1, &value);
+    return set_flag_(instance_.get(), &r, 1, &value);
   }
-  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const { return set_integer_(instance_, &r, 1, &value); }
+  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
+    return set_integer_(instance_.get(), &r, 1, &value);
+  }
   [[nodiscard]] Called enter() const {
-    const Called called = set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0);
-    return called.worked() ? enter_(instance_) : called;
+    const Called called = set_up_(instance_.get(), fmi2False, 0.0, 0.0, fmi2False, 0.0);
+    return called.worked() ? enter_(instance_.get()) : called;
   }
-  [[nodiscard]] Called exit() const { return exit_(instance_); }
-  [[nodiscard]] Called reset() const { return reset_(instance_); }
-  [[nodiscard]] Called step(double time_s, double step_s) const { return step_(instance_, time_s, step_s, fmi2True); }
+  [[nodiscard]] Called exit() const { return exit_(instance_.get()); }
+  [[nodiscard]] Called reset() const { return reset_(instance_.get()); }
+  [[nodiscard]] Called step(double time_s, double step_s) const {
+    return step_(instance_.get(), time_s, step_s, fmi2True);
+  }
 
  private:
   const LoadedLibrary& library_;
   fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
   fmi2InstantiateTYPE* instantiate_{library_.find<fmi2InstantiateTYPE>("fmi2Instantiate")};
-  fmi2FreeInstanceTYPE* free_{library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")};
   Function<fmi2SetupExperimentTYPE> set_up_{library_, "fmi2SetupExperiment"};
   Function<fmi2EnterInitializationModeTYPE> enter_{library_, "fmi2EnterInitializationMode"};
   Function<fmi2ExitInitializationModeTYPE> exit_{library_, "fmi2ExitInitializationMode"};
@@ -117,37 +116,35 @@ class Instance2 {
   Function<fmi2SetBooleanTYPE> set_flag_{library_, "fmi2SetBoolean"};
   Function<fmi2SetIntegerTYPE> set_integer_{library_, "fmi2SetInteger"};
   Function<fmi2DoStepTYPE> step_{library_, "fmi2DoStep"};
-  fmi2Component instance_{nullptr};
+  std::unique_ptr<void, fmi2FreeInstanceTYPE*> instance_{nullptr,
+                                                         library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")};
 };
 
 class Instance3 {
  public:
   Instance3(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
     const std::string path = resources + "/";
-    instance_ = instantiate_("controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False,
-                             fmi3False, nullptr, 0, nullptr, log3, nullptr);
-  }
-  Instance3(const Instance3&) = delete;
-  Instance3& operator=(const Instance3&) = delete;
-  ~Instance3() {
-    if (instance_ != nullptr) free_(instance_);
+    instance_.reset(instantiate_("controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False,
+                                 fmi3False, nullptr, 0, nullptr, log3, nullptr));
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value, 1); }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value, 1); }
-  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const { return set_flag_(instance_, &r, 1, &value, 1); }
-  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
-    return set_integer_(instance_, &r, 1, &value, 1);
+  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_.get(), &r, 1, &value, 1); }
+  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_.get(), &r, 1, &value, 1); }
+  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const {
+    return set_flag_(instance_.get(), &r, 1, &value, 1);
   }
-  [[nodiscard]] Called enter() const { return enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0); }
-  [[nodiscard]] Called exit() const { return exit_(instance_); }
-  [[nodiscard]] Called reset() const { return reset_(instance_); }
+  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
+    return set_integer_(instance_.get(), &r, 1, &value, 1);
+  }
+  [[nodiscard]] Called enter() const { return enter_(instance_.get(), fmi3False, 0.0, 0.0, fmi3False, 0.0); }
+  [[nodiscard]] Called exit() const { return exit_(instance_.get()); }
+  [[nodiscard]] Called reset() const { return reset_(instance_.get()); }
   [[nodiscard]] Called step(double time_s, double step_s) const {
     fmi3Boolean event = fmi3False;
     fmi3Boolean terminate = fmi3False;
     fmi3Boolean early = fmi3False;
     fmi3Float64 last_s = 0.0;
-    const Called called = step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s);
+    const Called called = step_(instance_.get(), time_s, step_s, fmi3True, &event, &terminate, &early, &last_s);
     return called.worked() && terminate ? Called{called.function, Called::wants_the_end} : called;
   }
 
@@ -155,7 +152,6 @@ class Instance3 {
   const LoadedLibrary& library_;
   fmi3InstantiateCoSimulationTYPE* instantiate_{
       library_.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation")};
-  fmi3FreeInstanceTYPE* free_{library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")};
   Function<fmi3EnterInitializationModeTYPE> enter_{library_, "fmi3EnterInitializationMode"};
   Function<fmi3ExitInitializationModeTYPE> exit_{library_, "fmi3ExitInitializationMode"};
   Function<fmi3ResetTYPE> reset_{library_, "fmi3Reset"};
@@ -164,7 +160,8 @@ class Instance3 {
   Function<fmi3SetBooleanTYPE> set_flag_{library_, "fmi3SetBoolean"};
   Function<fmi3SetInt32TYPE> set_integer_{library_, "fmi3SetInt32"};
   Function<fmi3DoStepTYPE> step_{library_, "fmi3DoStep"};
-  fmi3Instance instance_{nullptr};
+  std::unique_ptr<void, fmi3FreeInstanceTYPE*> instance_{nullptr,
+                                                         library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")};
 };
 
 /// The controller in an FMU. A step sets the inputs of this cycle, lets the FMU compute one period, and takes its

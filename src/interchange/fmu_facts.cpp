@@ -5,15 +5,14 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <fstream>
 #include <map>
 #include <pugixml.hpp>
+#include <ranges>
 #include <set>
-#include <sstream>
 
-#include "interchange/foreign_code.hpp"
+#include "interchange/foreign_controller.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/parse_toml.hpp"
 
 namespace abs_hil::interchange {
@@ -22,33 +21,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// NOLINTBEGIN(cppcoreguidelines-macro-usage)
-#define ABS_HIL_IN(name) \
-  CarriedQuantity { #name, offsetof(abs_hil_input, name) }
-#define ABS_HIL_OUT(name) \
-  CarriedQuantity { #name, offsetof(abs_hil_output, name) }
-// NOLINTEND(cppcoreguidelines-macro-usage)
+/// A quantity of ours that a variable of an FMU may carry.
+struct CarriedQuantity {
+  std::string_view name;
+  std::size_t offset;  ///< in abs_hil_input or abs_hil_output
+};
 
-constexpr std::array our_inputs{ABS_HIL_IN(time_s),
-                                ABS_HIL_IN(dt_s),
-                                ABS_HIL_IN(omega1_rad_s),
-                                ABS_HIL_IN(omega2_rad_s),
-                                ABS_HIL_IN(slip),
-                                ABS_HIL_IN(slip_ref),
-                                ABS_HIL_IN(mean_brake_torque_Nm),
-                                ABS_HIL_IN(brake_torque_Nm),
-                                ABS_HIL_IN(max_brake_torque_Nm),
-                                ABS_HIL_IN(alpha1_rad_s2),
-                                ABS_HIL_IN(alpha2_rad_s2),
-                                ABS_HIL_IN(upper_travel_rad),
-                                ABS_HIL_IN(lower_travel_rad),
-                                ABS_HIL_IN(sent_brake_torque_Nm),
-                                ABS_HIL_IN(unsent_torque_Nm)};
-constexpr std::array our_outputs{ABS_HIL_OUT(brake_torque_Nm), ABS_HIL_OUT(slip_velocity_error_m_s),
-                                 ABS_HIL_OUT(theta_est_N), ABS_HIL_OUT(slip_ref)};
+/// Takes the quantities of an input or output, for `for_each_input` and `for_each_output`.
+template <class Foreign>
+auto taken_to(std::vector<CarriedQuantity>& ours, const Foreign& foreign) {
+  return [&ours, &foreign](std::string_view name, const double& value, double) {
+    const auto offset = reinterpret_cast<const char*>(&value) - reinterpret_cast<const char*>(&foreign);
+    ours.push_back({name, static_cast<std::size_t>(offset)});
+  };
+}
 
-#undef ABS_HIL_IN
-#undef ABS_HIL_OUT
+std::vector<CarriedQuantity> our_inputs() {
+  std::vector<CarriedQuantity> ours{{"time_s", offsetof(abs_hil_input, time_s)}};
+  const abs_hil_input foreign{};
+  const control::SlipInput own{};
+  for_each_input(foreign, own, taken_to(ours, foreign));
+  return ours;
+}
+std::vector<CarriedQuantity> our_outputs() {
+  std::vector<CarriedQuantity> ours;
+  const abs_hil_output foreign{};
+  const control::SlipOutput own{};
+  for_each_output(foreign, own, taken_to(ours, foreign));
+  return ours;
+}
 
 struct TheirVariable {
   std::uint32_t reference{0};
@@ -61,9 +62,7 @@ bool is_real(const TheirVariable& variable) { return variable.type == "Real" || 
 
 std::uint32_t reference_of(const fs::path& file, pugi::xml_node node) {
   const std::string_view text = node.attribute("valueReference").as_string();
-  std::uint32_t reference = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), reference);
-  if (error == std::errc() && end == text.data() + text.size()) return reference;
+  if (const auto reference = rig::parse_number<std::uint32_t>(text)) return *reference;
   refuse(file, fmt::format("damaged modelDescription.xml: variable \"{}\" has the valueReference \"{}\"; it needs a "
                            "whole number in [0, 4294967295]",
                            node.attribute("name").as_string(), text));
@@ -101,9 +100,8 @@ const TheirVariable& their(const fs::path& file, const TheirVariables& variables
   return at->second;
 }
 
-template <std::size_t count>
 void link(const fs::path& file, const TheirVariables& variables, const toml::table* names, const char* causality,
-          const std::array<CarriedQuantity, count>& ours, std::vector<FmuLink>& links) {
+          const std::vector<CarriedQuantity>& ours, std::vector<FmuLink>& links) {
   const auto add = [&](const std::string& name, const CarriedQuantity& quantity) {
     const TheirVariable& variable = their(file, variables, name, causality);
     if (!is_real(variable)) {
@@ -115,15 +113,14 @@ void link(const fs::path& file, const TheirVariables& variables, const toml::tab
   const auto find = [&](std::string_view name) { return std::ranges::find(ours, name, &CarriedQuantity::name); };
   const bool inputs = std::string_view(causality) == "input";
   const auto known = [&] {
-    std::string all;
-    for (const CarriedQuantity& q : ours) all.append(all.empty() ? "" : ", ").append(q.name);
-    return all + (inputs ? ", start (it keeps its start value)" : "");
+    return fmt::format("{}{}", fmt::join(ours | std::views::transform(&CarriedQuantity::name), ", "),
+                       inputs ? ", start (it keeps its start value)" : "");
   };
   std::set<std::string_view> named;
   if (names != nullptr) {
     for (const auto& [key, node] : *names) {
       const std::string name(key.str());
-      const auto text = node.template value<std::string_view>().value_or("");
+      const auto text = node.value<std::string_view>().value_or("");
       if (inputs && text == "start") {
         static_cast<void>(their(file, variables, name, causality));
         continue;
@@ -185,9 +182,7 @@ toml::table read_mapping(const fs::path& mapping) {
     }
     return table;
   } catch (const toml::parse_error& error) {
-    std::ostringstream place;
-    place << error.source().begin.line;
-    refuse(mapping, fmt::format("line {}: {}", place.str(), error.description()));
+    refuse(mapping, fmt::format("line {}: {}", error.source().begin.line, error.description()));
   }
 }
 
@@ -218,8 +213,8 @@ FmuFacts facts_of(const fs::path& file, const fs::path& folder, const fs::path& 
   }
   const TheirVariables variables = variables_of(file, root, facts.fmi);
   const toml::table names = read_mapping(mapping);
-  link(file, variables, names["inputs"].as_table(), "input", our_inputs, facts.inputs);
-  link(file, variables, names["outputs"].as_table(), "output", our_outputs, facts.outputs);
+  link(file, variables, names["inputs"].as_table(), "input", our_inputs(), facts.inputs);
+  link(file, variables, names["outputs"].as_table(), "output", our_outputs(), facts.outputs);
   if (const toml::table* values = names["parameters"].as_table()) set_parameters(file, variables, *values, facts);
   const bool torque = std::any_of(facts.outputs.begin(), facts.outputs.end(), [](const FmuLink& out) {
     return out.offset == offsetof(abs_hil_output, brake_torque_Nm);

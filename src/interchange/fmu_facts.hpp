@@ -4,10 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
-
-#include "abs_hil/interchange/controller.h"
 
 namespace abs_hil::interchange {
 
@@ -25,13 +22,9 @@ class ExtractedFmu {
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
  private:
-  std::filesystem::path folder_{};
-};
+  ExtractedFmu();  ///< an empty folder
 
-/// A quantity of ours that a variable of an FMU may carry.
-struct CarriedQuantity {
-  std::string_view name;
-  std::size_t offset;  ///< in abs_hil_input or abs_hil_output
+  std::filesystem::path folder_{};
 };
 
 /// A variable of an FMU that carries one of our quantities, or a parameter with its value.

@@ -46,29 +46,10 @@ std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
   return fmu;
 }
 
-/// Calls `take(foreign, own)` for each quantity that both inputs have.
-template <class Foreign, class Own, class Take>
-void for_each_input(Foreign& foreign, Own& own, const Take& take) noexcept {
-  take(foreign.dt_s, own.dt_s);
-  take(foreign.omega1_rad_s, own.speeds.omega1_rad_s);
-  take(foreign.omega2_rad_s, own.speeds.omega2_rad_s);
-  take(foreign.slip, own.slip);
-  take(foreign.slip_ref, own.slip_ref);
-  take(foreign.mean_brake_torque_Nm, own.mean_brake_torque_Nm);
-  take(foreign.brake_torque_Nm, own.brake_torque_Nm);
-  take(foreign.max_brake_torque_Nm, own.max_brake_torque_Nm);
-  take(foreign.alpha1_rad_s2, own.alpha1_rad_s2);
-  take(foreign.alpha2_rad_s2, own.alpha2_rad_s2);
-  take(foreign.upper_travel_rad, own.upper_travel_rad);
-  take(foreign.lower_travel_rad, own.lower_travel_rad);
-  take(foreign.sent_brake_torque_Nm, own.sent_brake_torque_Nm);
-  take(foreign.unsent_torque_Nm, own.unsent_torque_Nm);
-}
-
 abs_hil_input foreign_input(const control::SlipInput& own, double time_s) noexcept {
   abs_hil_input foreign{};
   foreign.time_s = time_s;
-  for_each_input(foreign, own, [](double& to, double from) { to = from; });
+  for_each_input(foreign, own, [](std::string_view, double& to, double from) { to = from; });
   return foreign;
 }
 
@@ -76,16 +57,13 @@ abs_hil_input foreign_input(const control::SlipInput& own, double time_s) noexce
 
 control::SlipInput slip_input(const abs_hil_input& foreign) noexcept {
   control::SlipInput own{};
-  for_each_input(foreign, own, [](double from, double& to) { to = from; });
+  for_each_input(foreign, own, [](std::string_view, double from, double& to) { to = from; });
   return own;
 }
 
 abs_hil_output foreign_output(const control::SlipOutput& out) noexcept {
-  abs_hil_output output{.brake_torque_Nm = out.brake_torque_Nm,
-                        .slip_velocity_error_m_s = out.slip_velocity_error_m_s,
-                        .theta_est_N = out.theta_est_N,
-                        .slip_ref = out.slip_ref,
-                        .signals = {}};
+  abs_hil_output output{};
+  for_each_output(output, out, [](std::string_view, double& to, double from) { to = from; });
   for (std::size_t n = 0; n < rig::signal_max; ++n) output.signals[n] = out.signals[n];
   return output;
 }
@@ -118,10 +96,8 @@ control::SlipOutput ForeignController::step(const control::SlipInput& input) noe
   const std::int64_t before_ns = clock.now_ns();
   code_->step(foreign_input(input, time_s_), output);
   step_times_->add(clock.now_ns() - before_ns);
-  control::SlipOutput taken{.brake_torque_Nm = output.brake_torque_Nm,
-                            .slip_velocity_error_m_s = output.slip_velocity_error_m_s,
-                            .theta_est_N = output.theta_est_N,
-                            .slip_ref = output.slip_ref};
+  control::SlipOutput taken{};
+  for_each_output(output, taken, [](std::string_view, double from, double& to) { to = from; });
   static_assert(rig::signal_max == ABS_HIL_CONTROLLER_SIGNALS);
   for (std::size_t n = 0; n < signals_.size(); ++n) taken.signals[n] = output.signals[n];
   return taken;

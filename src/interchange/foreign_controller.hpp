@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abs_hil/control/controller_context.hpp"
@@ -57,6 +58,33 @@ class ForeignController final : public control::SlipController {
   std::unique_ptr<runtime::LatencyHistogram> step_times_;
   double time_s_{0.0};
 };
+
+/// Calls `take(name, foreign, own)` for each quantity that both inputs have: a law's, and those of the C interface.
+template <class Foreign, class Own, class Take>
+void for_each_input(Foreign& foreign, Own& own, const Take& take) {
+  take("dt_s", foreign.dt_s, own.dt_s);
+  take("omega1_rad_s", foreign.omega1_rad_s, own.speeds.omega1_rad_s);
+  take("omega2_rad_s", foreign.omega2_rad_s, own.speeds.omega2_rad_s);
+  take("slip", foreign.slip, own.slip);
+  take("slip_ref", foreign.slip_ref, own.slip_ref);
+  take("mean_brake_torque_Nm", foreign.mean_brake_torque_Nm, own.mean_brake_torque_Nm);
+  take("brake_torque_Nm", foreign.brake_torque_Nm, own.brake_torque_Nm);
+  take("max_brake_torque_Nm", foreign.max_brake_torque_Nm, own.max_brake_torque_Nm);
+  take("alpha1_rad_s2", foreign.alpha1_rad_s2, own.alpha1_rad_s2);
+  take("alpha2_rad_s2", foreign.alpha2_rad_s2, own.alpha2_rad_s2);
+  take("upper_travel_rad", foreign.upper_travel_rad, own.upper_travel_rad);
+  take("lower_travel_rad", foreign.lower_travel_rad, own.lower_travel_rad);
+  take("sent_brake_torque_Nm", foreign.sent_brake_torque_Nm, own.sent_brake_torque_Nm);
+  take("unsent_torque_Nm", foreign.unsent_torque_Nm, own.unsent_torque_Nm);
+}
+/// The same for the outputs, but for the signals of the controller's own.
+template <class Foreign, class Own, class Take>
+void for_each_output(Foreign& foreign, Own& own, const Take& take) {
+  take("brake_torque_Nm", foreign.brake_torque_Nm, own.brake_torque_Nm);
+  take("slip_velocity_error_m_s", foreign.slip_velocity_error_m_s, own.slip_velocity_error_m_s);
+  take("theta_est_N", foreign.theta_est_N, own.theta_est_N);
+  take("slip_ref", foreign.slip_ref, own.slip_ref);
+}
 
 /// What a law is told and answers, in the terms of the C interface.
 [[nodiscard]] control::SlipInput slip_input(const abs_hil_input& foreign) noexcept;

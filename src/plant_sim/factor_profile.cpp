@@ -2,8 +2,8 @@
 #include "abs_hil/plant_sim/factor_profile.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -21,28 +21,17 @@ constexpr double time_rounding_s = 1e-11;
   throw std::invalid_argument("\"" + std::string(part) + "\" " + problem);
 }
 
-/// Removes and returns the text before `separator` from `rest`; all of it if there is no separator.
-std::string_view cut(std::string_view& rest, char separator) {
-  const std::size_t at = rest.find(separator);
-  const std::string_view head = rest.substr(0, at);
-  rest = at == std::string_view::npos ? std::string_view{} : rest.substr(at + 1);
-  return rig::trimmed(head);
-}
-
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
-  while (!(text = rig::trimmed(text)).empty()) words.push_back(cut(text, ' '));
+  for (const std::string_view word : rig::split(text, ' ')) words.push_back(rig::trimmed(word));
+  std::erase(words, std::string_view());
   return words;
 }
 
 double number(std::string_view word, std::string_view part) {
-  double value = 0.0;
-  const char* end = word.data() + word.size();
-  const auto [at, error] = std::from_chars(word.data(), end, value);
-  if (error != std::errc() || at != end || !std::isfinite(value)) {
-    refuse(part, "holds \"" + std::string(word) + "\" instead of a number");
-  }
-  return value;
+  const auto value = rig::parse_number<double>(word);
+  if (!value || !std::isfinite(*value)) refuse(part, "holds \"" + std::string(word) + "\" instead of a number");
+  return *value;
 }
 
 double factor(std::string_view word, std::string_view part) {
@@ -74,19 +63,17 @@ Change change(std::string_view part) {
 
 }  // namespace
 
-FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes axes) try : pieces_{{}
-}  // namespace abs_hil::plant_sim
-{
-  if (rig::trimmed(text).empty()) return;
-  const bool time_only = axes == Axes::time_only;
+FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes axes) try {
   const std::string_view whole = rig::trimmed(text);
-  if (whole.find(':') == std::string_view::npos) {
+  if (whole.empty()) return;
+  const bool time_only = axes == Axes::time_only;
+  const std::size_t colon = whole.find(':');
+  if (colon == std::string_view::npos) {
     refuse(whole, time_only ? "names no axis; begin with \"time:\" or \"braking time:\""
                             : "names no axis; begin with \"time:\", \"distance:\", \"braking time:\" or "
                               "\"braking distance:\"");
   }
-  std::string_view rest = whole;
-  const std::string_view head = cut(rest, ':');
+  const std::string_view head = rig::trimmed(whole.substr(0, colon));
   const std::vector<std::string_view> axis = words_of(head);
   from_braking_ = axis.size() == 2 && axis.front() == "braking";
   if ((axis.size() != 1 && !from_braking_) || (axis.back() != "time" && (axis.back() != "distance" || time_only))) {
@@ -95,11 +82,12 @@ FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes a
   }
   axis_ = axis.back() == "time" ? Axis::time : Axis::distance;
 
-  const std::string_view first = cut(rest, ';');
-  pieces_.front().value = factor(first, first);
+  std::vector<std::string_view> parts = rig::split(whole.substr(colon + 1), ';');
+  for (std::string_view& part : parts) part = rig::trimmed(part);
+  if (parts.size() > 1 && parts.back().empty()) parts.pop_back();
+  pieces_.front().value = factor(parts.front(), parts.front());
   double jumped_at = 0.0;
-  while (!rig::trimmed(rest).empty()) {
-    const std::string_view part = cut(rest, ';');
+  for (const std::string_view part : std::span(parts).subspan(1)) {
     const Change next = change(part);
     Piece& last = pieces_.back();
     if (next.begin < last.begin) refuse(part, "must not begin before the previous change has ended");
@@ -115,8 +103,7 @@ FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes a
     }
     pieces_.push_back({.begin = next.end, .value = next.value});
   }
-}
-catch (const std::invalid_argument& problem) {
+} catch (const std::invalid_argument& problem) {
   throw std::invalid_argument(std::string(key) + ": " + problem.what());
 }
 

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "plant_sim/brake_path.hpp"
 #include "plant_sim/stepping.hpp"
 
 namespace abs_hil::plant_sim {
@@ -30,29 +28,9 @@ Plant::Plant(const PlantOptions& options)
       profile_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
       drift_(options.drift),
       model_(options, profile_.profile().highest()) {
-  auto path = std::make_unique<BrakePath>(options_.brake_flaws, rig::brake_torque_at(options_.rig.brake, 1.0),
-                                          options_.ideal_actuator);
-  if (path->any()) brake_path_ = std::move(path);
+  brake_path_.emplace(options_.brake_flaws, rig::brake_torque_at(options_.rig.brake, 1.0), options_.ideal_actuator);
+  if (!brake_path_->any()) brake_path_.reset();
   let_bearings_drift(drift_.after(0.0));
-}
-
-Plant::~Plant() = default;
-Plant::Plant(Plant&& other) noexcept = default;
-Plant::Plant(const Plant& other)
-    : options_(other.options_),
-      profile_(other.profile_),
-      drift_(other.drift_),
-      model_(other.model_),
-      state_(other.state_),
-      brake_path_(other.brake_path_ ? std::make_unique<BrakePath>(*other.brake_path_) : nullptr) {}
-Plant& Plant::operator=(Plant other) noexcept {
-  options_ = std::move(other.options_);
-  profile_ = std::move(other.profile_);
-  drift_ = std::move(other.drift_);
-  model_ = other.model_;
-  state_ = other.state_;
-  brake_path_ = std::move(other.brake_path_);
-  return *this;
 }
 
 void Plant::reset(const PlantState& state) noexcept {

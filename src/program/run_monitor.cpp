@@ -30,13 +30,15 @@ std::uint64_t silent_cycles_max(const config::Settings& s) {
 
 telemetry::ExperimentInfo experiment_info(const config::Configuration& configuration, rig::RunNames names) {
   const config::Settings& s = configuration.settings;
-  return {.experiment = s.experiment.name,
-          .controller = s.control.controller,
-          .plant = s.plant_name,
-          .backend = s.backend,
-          .config_json = configuration.json,
-          .version = ABS_HIL_VERSION,
-          .names = std::move(names)};
+  telemetry::ExperimentInfo info{};
+  info.experiment = s.experiment.name;
+  info.controller = s.control.controller;
+  info.plant = s.plant_name;
+  info.backend = s.backend;
+  info.config_json = configuration.json;
+  info.version = ABS_HIL_VERSION;
+  info.names = std::move(names);
+  return info;
 }
 
 std::string guardian_launch_json(const config::Configuration& configuration, const std::filesystem::path& record_prefix,

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "analysis/json_number.hpp"
+#include "analysis/run_summary.hpp"
 #include "config/key_table.hpp"
 #include "config/model.hpp"
 #include "rig/formatted_text.hpp"

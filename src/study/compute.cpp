@@ -21,11 +21,6 @@ namespace abs_hil::study {
 
 namespace {
 
-std::string text_of(const config::Value& value) {
-  if (const auto* text = std::get_if<std::string>(&value)) return rig::csv_field(*text);
-  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
-}
-
 /// What the columns `result` and `reason` say.
 std::string ending_of(const Outcome& outcome) {
   if (!outcome.refusal.empty()) return "refused," + rig::csv_field(outcome.refusal);
@@ -107,7 +102,8 @@ std::string result_row(const Study& study, std::uint64_t run, const Outcome& out
   fmt::format_to(out, "{},{},{},{},{},{}", run, rig::csv_field(one.plant), rig::csv_field(one.experiment),
                  rig::csv_field(study.contenders(index.study_case)[index.contender].name), index.point,
                  index.repetition);
-  for (std::size_t i = 0; i < study.script().factors.size(); ++i) row += ',' + text_of(study.value_of(index, i));
+  for (std::size_t i = 0; i < study.script().factors.size(); ++i)
+    row += ',' + rig::csv_field(config::text_of(study.value_of(index, i)));
   row += ',' + ending_of(outcome);
   for (const analysis::Figure& figure : analysis::figures) {
     fmt::format_to(out, ",{}", outcome.refusal.empty() ? figure.of(outcome.run.metrics) : rig::unknown);

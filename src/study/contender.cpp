@@ -43,7 +43,7 @@ std::string full_name(const config::KeyTable& keys, std::string_view key, const 
 void set(Contender& contender, config::KeyTable& keys, const std::string& name, const config::Value& value,
          const std::string& origin) {
   keys.set(name, value, origin);
-  contender.changes.emplace_back(name, std::visit([](const auto& v) { return fmt::format("{}", v); }, value));
+  contender.changes.emplace_back(name, config::text_of(value));
 }
 
 /// True if the file names the controller.

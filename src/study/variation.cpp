@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <random>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "rig/formatted_text.hpp"
 
@@ -36,14 +36,10 @@ constexpr std::array<Magnitude, 5> magnitudes{{{"wheels", &Variation::wheels},
                                                {"radii", &Variation::radii}}};
 
 double parse_magnitude(std::string_view entry, std::string_view text) {
-  double value = 0.0;
-  const char* end = text.data() + text.size();
-  const auto [at, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || at != end || !(value >= 0.0 && value <= largest_magnitude)) {
-    throw std::invalid_argument(
-        fmt::format("--vary: \"{}\": give a magnitude in [0, {}], as in theta=0.1", entry, largest_magnitude));
-  }
-  return value;
+  const auto value = rig::parse_number<double>(text);
+  if (value && *value >= 0.0 && *value <= largest_magnitude) return *value;
+  throw std::invalid_argument(
+      fmt::format("--vary: \"{}\": give a magnitude in [0, {}], as in theta=0.1", entry, largest_magnitude));
 }
 
 void parse_entry(std::string_view entry, Variation& v) {
@@ -100,18 +96,17 @@ Variation Variation::parse(std::string_view text) {
 }
 
 std::string Variation::text() const {
-  std::string text;
-  const auto add = [&text](const std::string& entry) { text += (text.empty() ? "" : ",") + entry; };
-  const auto add_magnitude = [&add](std::string_view name, double magnitude) {
-    if (magnitude > 0.0) add(fmt::format("{}={}", name, magnitude));
+  std::vector<std::string> entries;
+  const auto add = [&entries](std::string_view name, double magnitude) {
+    if (magnitude > 0.0) entries.push_back(fmt::format("{}={}", name, magnitude));
   };
   const bool alike = wheels == brake && brake == tyre;
-  if (alike) add_magnitude("parameters", wheels);
+  if (alike) add("parameters", wheels);
   for (const Magnitude& magnitude : std::span(magnitudes).subspan(alike ? 3 : 0)) {
-    add_magnitude(magnitude.name, this->*magnitude.value);
+    add(magnitude.name, this->*magnitude.value);
   }
-  if (phase) add("phase");
-  return text.empty() ? "none" : text;
+  if (phase) entries.emplace_back("phase");
+  return entries.empty() ? "none" : fmt::format("{}", fmt::join(entries, ","));
 }
 
 Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {

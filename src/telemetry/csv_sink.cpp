@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <type_traits>
 #include <utility>
 
@@ -14,9 +13,6 @@
 
 namespace abs_hil::telemetry {
 namespace {
-
-constexpr std::size_t block_bytes = 65'536;
-constexpr std::string_view csv_kind = "CSV file";
 
 // The longest double is -1.2345678901234567e-308, the longest whole number has a sign and 19 digits.
 constexpr std::size_t longest_value = 24;
@@ -64,75 +60,21 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
 }
 
 CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::RunNames names)
-    : file_(std::in_place, path, std::string(csv_kind)),
-      path_(std::move(path)),
-      buffer_(block_bytes),
+    : file_(std::move(path), "CSV file", write_period_ns > 0),
       write_period_ns_(write_period_ns),
       names_(std::move(names)) {
-  append(csv_header.data(), csv_header.size());
-  if (names_.has_own_phase_names()) {
-    append(",", 1);
-    append(phase_name_column.data(), phase_name_column.size());
-  }
-  for (const std::string& signal : names_.signals) {
-    append(",", 1);
-    append(signal.data(), signal.size());
-  }
-  append("\n", 1);
-}
-
-CsvSink::~CsvSink() {
-  // An error ended the run: what was recorded stays. Without a single row an older file stays.
-  if (rows_ > 0) close();
+  std::string header = csv_header;
+  if (names_.has_own_phase_names()) header.append(",").append(phase_name_column);
+  for (const std::string& signal : names_.signals) header.append(",").append(signal);
+  file_.begin(header + '\n');
 }
 
 void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
   char row[csv_row_max_bytes];
-  append(row, format_csv_row(record, distance_m, row, names_));
-  ++rows_buffered_;
-  ++rows_;
-  if (write_period_ns_ > 0 && record.stamp_ns - last_write_ns_ >= write_period_ns_) {
-    flush();
-    last_write_ns_ = record.stamp_ns;
-  }
-}
-
-void CsvSink::finish() {
-  close();
-  if (failed()) throw files::FileError(csv_kind, path_, error_number_);
-}
-
-void CsvSink::append(const char* text, std::size_t size) noexcept {
-  if (size > buffer_.size() - used_bytes_) flush();  // whole rows only, so that no block ends with a part of a row
-  std::memcpy(buffer_.data() + used_bytes_, text, size);
-  used_bytes_ += size;
-}
-
-void CsvSink::flush() noexcept {
-  // No retry after a failure: a file that ends early is better than a file with a gap.
-  if (!failed() && file_) {
-    try {
-      file_->append({buffer_.data(), used_bytes_});
-      file_->flush();
-      if (write_period_ns_ > 0) file_->show();
-    } catch (const files::FileError& error) {
-      error_number_ = error.error_number();
-    }
-  }
-  if (failed()) rows_lost_ += rows_buffered_;
-  rows_buffered_ = 0;
-  used_bytes_ = 0;
-}
-
-void CsvSink::close() noexcept {
-  flush();
-  try {
-    if (file_ && !failed()) file_->commit();
-  } catch (const files::FileError& error) {
-    error_number_ = error.error_number();
-  }
-  file_.reset();
-  if (failed() && write_period_ns_ == 0) rows_lost_ = rows_;  // a file that is not whole does not appear
+  const std::size_t size = format_csv_row(record, distance_m, row, names_);
+  const bool due = write_period_ns_ > 0 && record.stamp_ns - last_write_ns_ >= write_period_ns_;
+  if (due) last_write_ns_ = record.stamp_ns;
+  file_.append({row, size}, due);
 }
 
 }  // namespace abs_hil::telemetry

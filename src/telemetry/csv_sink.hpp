@@ -3,14 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "files/result_file.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
+#include "telemetry/record_file.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -31,7 +29,7 @@ inline constexpr std::string_view phase_name_column = "phase_name";
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
                            const rig::RunNames& names = {}) noexcept;
 
-/// Writes one row per cycle to a file, in blocks of whole rows of at most 64 KiB.
+/// Writes one row per cycle to a file (RecordFile).
 class CsvSink : public rig::RecordSink {
  public:
   /// Throws files::FileError when the file cannot be opened.
@@ -39,34 +37,16 @@ class CsvSink : public rig::RecordSink {
   ///                         loses no older rows; the first of these writes replaces an older file. 0: rows are written
   ///                         when a block is full, and the file appears when it is whole
   explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0, rig::RunNames names = {});
-  /// As finish() if rows came, without a report of a failure.
-  ~CsvSink() override;
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Closes the file. Throws files::FileError if any write has failed since the start, as on a full disk.
-  void finish() override;
-
-  /// True after a write has failed. Later rows are not in the file.
-  [[nodiscard]] bool failed() const noexcept { return error_number_ != 0; }
-  /// Rows that are missing or incomplete in the file.
-  [[nodiscard]] std::uint64_t rows_lost() const noexcept { return rows_lost_; }
+  void finish() override { file_.finish(); }
+  [[nodiscard]] std::uint64_t rows_lost() const noexcept { return file_.lost(); }
 
  private:
-  void append(const char* text, std::size_t size) noexcept;
-  void flush() noexcept;
-  void close() noexcept;
-
-  std::optional<files::ResultFile> file_;
-  std::filesystem::path path_;
-  std::vector<char> buffer_;
+  RecordFile file_;
   std::int64_t write_period_ns_;
   rig::RunNames names_;
   std::int64_t last_write_ns_{0};  ///< stamp of the record of the last write
-  std::size_t used_bytes_{0};
-  std::uint64_t rows_{0};
-  std::uint64_t rows_buffered_{0};
-  std::uint64_t rows_lost_{0};
-  int error_number_{0};  ///< errno of the first write that failed
 };
 
 /// Numbers of events.

@@ -85,17 +85,15 @@ std::string for_each_event(const std::filesystem::path& log, const std::function
   return reader.cut();
 }
 
-void EventLogWriter::write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
-                           std::span<const std::uint8_t> data) {
+void append_event(std::string& log, std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
+                  std::span<const std::uint8_t> data) {
   std::array<std::uint8_t, header_bytes> header{};
   boost::endian::store_big_u32(header.data(), sync_word);
   boost::endian::store_big_s64(&header[4], number);
   boost::endian::store_big_s64(&header[12], timestamp_us);
   boost::endian::store_big_u32(&header[20], static_cast<std::uint32_t>(channel.size()));
   boost::endian::store_big_u32(&header[24], static_cast<std::uint32_t>(data.size()));
-  file_.append({reinterpret_cast<const char*>(header.data()), header.size()});
-  file_.append(channel);
-  file_.append({reinterpret_cast<const char*>(data.data()), data.size()});
+  log.append(header.begin(), header.end()).append(channel).append(data.begin(), data.end());
 }
 
 }  // namespace abs_hil::telemetry

@@ -9,10 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
-
-#include "files/result_file.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -60,18 +57,8 @@ class EventLogReader {
 /// calls.
 std::string for_each_event(const std::filesystem::path& log, const std::function<void(const LogEvent&)>& take);
 
-/// Writes an event log as LCM does. Its members throw files::FileError.
-class EventLogWriter {
- public:
-  explicit EventLogWriter(std::filesystem::path path) : file_(std::move(path), "event log") {}
-  void write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
-             std::span<const std::uint8_t> data);
-  void write(const LogEvent& event) { write(event.number, event.timestamp_us, event.channel, event.data); }
-  [[nodiscard]] files::ResultFile& file() noexcept { return file_; }
-  void finish() { file_.commit(); }
-
- private:
-  files::ResultFile file_;
-};
+/// Appends an event to the bytes of a log, as LCM does.
+void append_event(std::string& log, std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
+                  std::span<const std::uint8_t> data);
 
 }  // namespace abs_hil::telemetry

@@ -72,20 +72,6 @@ constexpr std::uint32_t protocol_version = 0x0100;
 /// The kernel grants at most twice net.core.wmem_max, about 400 kB by default. It reports room while a third is free.
 constexpr int send_buffer_bytes = 1 << 20;
 
-class Socket {
- public:
-  explicit Socket(int type) : descriptor_(::socket(AF_INET, type | SOCK_CLOEXEC, 0)) {}
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  ~Socket() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  [[nodiscard]] int get() const noexcept { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 class Deadline {
  public:
   explicit Deadline(int timeout_ms) : end_(Clock::now() + std::chrono::milliseconds(timeout_ms)) {}

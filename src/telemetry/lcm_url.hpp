@@ -1,6 +1,8 @@
 #pragma once
 
 #include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdint>
 #include <optional>
@@ -31,6 +33,21 @@ struct Endpoint {
 
 /// The same for the system; nothing if the address is no IPv4 address in numbers.
 [[nodiscard]] std::optional<sockaddr_in> socket_address_of(const Endpoint& endpoint) noexcept;
+
+/// A socket of IPv4 that closes itself; its descriptor is < 0 if the system has none.
+class Socket {
+ public:
+  explicit Socket(int type) : descriptor_(::socket(AF_INET, type | SOCK_CLOEXEC, 0)) {}
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  ~Socket() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  [[nodiscard]] int get() const noexcept { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
 
 /// The environment's LCM_DEFAULT_URL, else udpm://239.255.76.67:7667?ttl=0, which stays within this computer.
 [[nodiscard]] std::string default_lcm_url();

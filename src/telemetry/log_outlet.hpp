@@ -9,10 +9,12 @@
 
 #include "telemetry/event_log.hpp"
 #include "telemetry/outlet.hpp"
+#include "telemetry/record_file.hpp"
 
 namespace abs_hil::telemetry {
 
-/// Writes an LCM event log as lcm-logger does. lcm-logplayer and lcm-spy can read it. Each cycle takes about 0.4 kB.
+/// Writes an LCM event log as lcm-logger does (RecordFile). lcm-logplayer and lcm-spy can read it. Each cycle takes
+/// about 0.4 kB.
 class LogOutlet : public Outlet {
  public:
   /// Event times are `epoch_us` plus run time, us since 1970. Without an epoch it is the
@@ -24,26 +26,18 @@ class LogOutlet : public Outlet {
   ///                        block of 64 KiB is full, and the file appears when it is whole
   explicit LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us = std::nullopt,
                      double write_period_s = 0.0);
-  ~LogOutlet() override;
 
   void send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept override;
-  /// Closes the file. Throws files::FileError if any write has failed since the start, as on a full disk.
-  void finish() override;
-  /// Messages that are missing or incomplete in the file.
-  [[nodiscard]] std::uint64_t failures() const noexcept override { return failures_; }
+  void finish() override { file_.finish(); }
+  [[nodiscard]] std::uint64_t failures() const noexcept override { return file_.lost(); }
 
  private:
-  void note_failure(int error_number) noexcept;
-
-  std::optional<EventLogWriter> log_;
-  std::filesystem::path path_;
+  RecordFile file_;
+  std::string event_{};  ///< the latest, in the file's form
   std::optional<std::int64_t> epoch_us_;
   std::int64_t next_number_{0};
   double write_period_s_;
   double last_write_s_{0.0};
-  std::uint64_t buffered_{0};  ///< upper limit: messages since our last write
-  std::uint64_t failures_{0};
-  int error_number_{0};  ///< errno of the first write that failed
 };
 
 /// Time since 1970 in us, as in LCM's stamps.

@@ -1,5 +1,7 @@
 // Turns an event log into CSV files, one a channel.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -149,9 +151,7 @@ class LogToCsv {
   void note_telemetry(const telemetry_t& message, const std::string& channel, const std::string& header) {
     if (!main_key_.empty()) return;
     main_key_ = key_of(channel, {std::string(type_name<telemetry_t>), header, {}});
-    for (const std::string_view name : lacking_in(message)) {
-      counts_.lacks.append(counts_.lacks.empty() ? "" : ", ").append(name);
-    }
+    counts_.lacks = fmt::format("{}", fmt::join(lacking_in(message), ", "));
   }
   void write(const std::string& channel, const EventText& text, const std::string& told) {
     const std::string key = key_of(channel, text);

@@ -64,21 +64,12 @@ void check_channel_prefix(std::string_view prefix) {
 }
 
 MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
-    : options_(std::move(options)), status_(std::move(status)), names_(std::move(experiment.names)), detector_(names_) {
+    : options_(std::move(options)),
+      status_(std::move(status)),
+      names_(std::move(experiment.names)),
+      detector_(names_),
+      experiment_message_(std::move(experiment)) {
   check(options_);
-  telemetry_.name = options_.channel_prefix + "TELEMETRY";
-  status_channel_.name = options_.channel_prefix + "STATUS";
-  adjustment_.name = options_.channel_prefix + "ADJUSTMENT";
-  command_state_.name = options_.channel_prefix + "COMMAND_STATE";
-  event_.name = options_.channel_prefix + "EVENT";
-  experiment_.name = options_.channel_prefix + "EXPERIMENT";
-  command_channel_ = options_.channel_prefix + "COMMAND";
-  experiment_message_.experiment = std::move(experiment.experiment);
-  experiment_message_.controller = std::move(experiment.controller);
-  experiment_message_.plant = std::move(experiment.plant);
-  experiment_message_.backend = std::move(experiment.backend);
-  experiment_message_.config_json = std::move(experiment.config_json);
-  experiment_message_.version = std::move(experiment.version);
   telemetry_message_ = blank_message(names_);
 }
 

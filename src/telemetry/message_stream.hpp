@@ -13,23 +13,31 @@
 #include "abs_hil/status_t.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
+#include "rig/timing_summary.hpp"
 #include "telemetry/events.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/outlet.hpp"
-#include "telemetry/status_snapshot.hpp"
 
 namespace abs_hil::telemetry {
 
-/// Description of the run, for ABS_EXPERIMENT.
-struct ExperimentInfo {
-  std::string experiment;
-  std::string controller;
-  std::string plant;
-  std::string backend;
-  std::string config_json;  ///< effective configuration
-  std::string version;
+/// Description of the run: what ABS_EXPERIMENT says, and names.
+struct ExperimentInfo : experiment_t {
   rig::RunNames names{};  ///< of phases and signals, for events and telemetry
 };
+
+/// Data from the owner of the run for ABS_STATUS and the status line. All counts are since the start.
+struct StatusSnapshot {
+  std::uint64_t cycles{0};
+  std::uint64_t telemetry_drops{0};     ///< records that found the ring full
+  std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
+  /// Share of the time in which the gate's checks could not judge; NaN: not known.
+  double checks_unjudged{rig::unknown};
+  bool realtime{false};  ///< real-time scheduling and locked memory are in force
+  rig::TimingSummary timing{};
+};
+
+/// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.
+using StatusSource = std::function<StatusSnapshot()>;
 
 /// Channel prefix and rates of the messages.
 struct StreamOptions {
@@ -96,17 +104,17 @@ class MessageStream : public rig::RecordSink {
   StreamOptions options_;
   StatusSource status_;
   std::vector<Outlet*> outlets_;
-  Channel telemetry_;
-  Channel adjustment_;
-  Channel command_state_;
-  Channel status_channel_;
-  Channel event_;
-  Channel experiment_;
-  std::string command_channel_;
-  experiment_t experiment_message_{};
+  Channel telemetry_{options_.channel_prefix + "TELEMETRY"};
+  Channel adjustment_{options_.channel_prefix + "ADJUSTMENT"};
+  Channel command_state_{options_.channel_prefix + "COMMAND_STATE"};
+  Channel status_channel_{options_.channel_prefix + "STATUS"};
+  Channel event_{options_.channel_prefix + "EVENT"};
+  Channel experiment_{options_.channel_prefix + "EXPERIMENT"};
+  std::string command_channel_{options_.channel_prefix + "COMMAND"};
   telemetry_t telemetry_message_{};
   rig::RunNames names_;
   EventDetector detector_;
+  experiment_t experiment_message_;
   EncodeBuffer buffer_;
   rig::CycleRecord latest_{};
   std::uint64_t next_telemetry_cycle_{0};

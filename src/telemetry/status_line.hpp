@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "rig/record_sink.hpp"
-#include "telemetry/status_snapshot.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::telemetry {
 

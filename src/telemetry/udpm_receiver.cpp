@@ -3,7 +3,6 @@
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <boost/endian/conversion.hpp>
@@ -47,14 +46,11 @@ int number_in(std::string_view options, std::string_view name) {
 
 /// True if this computer has the address: only then a socket can be bound to it. Makes system calls, allocates nothing.
 bool is_own_address(const in_addr& address) noexcept {
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (socket < 0) return false;
+  const Socket socket(SOCK_DGRAM);
   sockaddr_in own{};
   own.sin_family = AF_INET;
   own.sin_addr = address;
-  const bool bound = ::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0;
-  ::close(socket);
-  return bound;
+  return ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0;
 }
 
 bool set(int socket, int level, int option, int value) {
@@ -94,21 +90,16 @@ LcmPacket look_at(std::span<const std::uint8_t> datagram, std::string_view chann
 }
 
 UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channel_(std::move(channel)) {
+  const int why_no_socket = errno;
   const LcmUrl parts = parse_lcm_url(url);
   own_computer_only_ = number_in(parts.options, "ttl=") == 0;
   const Endpoint endpoint = endpoint_of(parts);
-  errno = EINVAL;
-  if (const auto group = socket_address_of(endpoint)) {
-    socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (socket_ >= 0 && join(socket_, *group, number_in(parts.options, "recv_buf_size="))) return;
-  }
-  const std::string reason = std::generic_category().message(errno);
-  if (socket_ >= 0) ::close(socket_);
+  const auto group = socket_address_of(endpoint);
+  if (group && join(socket_.get(), *group, number_in(parts.options, "recv_buf_size="))) return;
+  const int problem = !group ? EINVAL : socket_.get() < 0 ? why_no_socket : errno;
   throw LcmError("commands cannot be received at " + endpoint.address + ":" + std::to_string(endpoint.port) + ": " +
-                 reason);
+                 std::generic_category().message(problem));
 }
-
-UdpmReceiver::~UdpmReceiver() { ::close(socket_); }
 
 bool UdpmReceiver::is_from_here(const in_addr& sender) noexcept {
   if (sender.s_addr == known_own_address_) return true;
@@ -129,7 +120,7 @@ UdpmReceiver::Arrival UdpmReceiver::next() noexcept {
     message.msg_iovlen = 1;
     message.msg_control = control.data();
     message.msg_controllen = control.size();
-    const ssize_t size = ::recvmsg(socket_, &message, 0);
+    const ssize_t size = ::recvmsg(socket_.get(), &message, 0);
     if (size < 0) return {};
     for (cmsghdr* note = CMSG_FIRSTHDR(&message); note != nullptr; note = CMSG_NXTHDR(&message, note)) {
       if (note->cmsg_level != SOL_SOCKET || note->cmsg_type != SO_RXQ_OVFL) continue;

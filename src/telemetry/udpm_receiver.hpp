@@ -1,13 +1,13 @@
 #pragma once
 
-#include <netinet/in.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -44,12 +44,9 @@ class UdpmReceiver {
   /// `url`: udpm://…; its recv_buf_size is requested from the kernel. Throws LcmError, naming the address, if it
   /// cannot join the group.
   UdpmReceiver(const std::string& url, std::string channel);
-  UdpmReceiver(const UdpmReceiver&) = delete;
-  UdpmReceiver& operator=(const UdpmReceiver&) = delete;
-  ~UdpmReceiver();
 
   /// For poll(2).
-  [[nodiscard]] int file_descriptor() const noexcept { return socket_; }
+  [[nodiscard]] int file_descriptor() const noexcept { return socket_.get(); }
 
   struct Arrival {
     bool any{false};                          ///< false: there is no message of the channel now
@@ -65,7 +62,7 @@ class UdpmReceiver {
  private:
   [[nodiscard]] bool is_from_here(const in_addr& sender) noexcept;
 
-  int socket_{-1};
+  Socket socket_{SOCK_DGRAM | SOCK_NONBLOCK};
   bool own_computer_only_{true};
   in_addr_t known_own_address_{0};  ///< of the last sender on this computer; 0: none yet
   std::string channel_;

@@ -14,7 +14,6 @@
 #include "injected_run.hpp"
 #include "simulated_run.hpp"
 #include "study/batch.hpp"
-#include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
 using namespace abs_hil;

@@ -78,15 +78,9 @@ TEST_CASE("the memory of another build, or any other descriptor, is refused befo
 }
 
 TEST_CASE("a launch configuration reads back; other text is refused") {
-  const LaunchConfig config{.run = {.experiment = "e",
-                                    .controller = "c",
-                                    .plant = "p",
-                                    .backend = "rig",
-                                    .config_json = R"({"a": {"b": "\"x\""}})",
-                                    .version = "1",
-                                    .names = {.signals = {"I_m", "zeta_N"}}},
-                            .realtime = runtime::RealtimeMode::require,
-                            .record_prefix = "/tmp/a b/recorder"};
+  LaunchConfig config{.realtime = runtime::RealtimeMode::require, .record_prefix = "/tmp/a b/recorder"};
+  config.run.config_json = R"({"a": {"b": "\"x\""}})";
+  config.run.names.signals = {"I_m", "zeta_N"};
   const LaunchConfig read = parse_launch_config(to_json(config));
   CHECK(read.run.config_json == config.run.config_json);
   CHECK(read.record_prefix == config.record_prefix);

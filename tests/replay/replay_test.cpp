@@ -102,10 +102,11 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   }
   const run::Prepared prepared(s);
   telemetry::LogOutlet log(path, 0);
-  telemetry::MessageStream stream({.telemetry_every_cycles = recipe.decimation},
-                                  {s.experiment.name, s.control.controller, s.plant_name, s.backend,
-                                   keys.to_json().dump(), "test", prepared.logic_parts(s.plant).names},
-                                  {});
+  telemetry::MessageStream stream(
+      {.telemetry_every_cycles = recipe.decimation},
+      {{0, 0, s.experiment.name, s.control.controller, s.plant_name, s.backend, keys.to_json().dump(), "test"},
+       prepared.logic_parts(s.plant).names},
+      {});
   stream.add(log);
   LateMeasurement late(stream, recipe);
   runtime::VirtualClock clock;

@@ -1,5 +1,5 @@
 // One run of a study has the figures of a whole run.
-#include "study/simulated_run.hpp"
+#include "study/batch.hpp"
 
 #include "catch.hpp"
 #include "experiment/simulated_run.hpp"

@@ -12,7 +12,7 @@ namespace {
 TEST_CASE("messages published on memq are delivered, in order and complete") {
   LcmOutlet outlet("memq://");
   test::LcmCapture capture(outlet, "ABS_.*");
-  MessageStream stream({}, {"paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}, {});
+  MessageStream stream({}, {{0, 0, "paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}}, {});
   stream.add(outlet);
   for (std::uint64_t i = 0; i < 200; ++i) stream.consume(test::sample_record(i), 0.0);
   capture.drain();

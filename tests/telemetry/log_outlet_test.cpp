@@ -19,7 +19,7 @@ constexpr std::uint64_t record_count = 3000;
 
 void write_log(const std::filesystem::path& path, std::optional<std::int64_t> epoch_us) {
   LogOutlet log(path, epoch_us);
-  MessageStream stream({}, {"paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}, {});
+  MessageStream stream({}, {{0, 0, "paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}}, {});
   stream.add(log);
   for (std::uint64_t i = 0; i < record_count; ++i) stream.consume(test::sample_record(i), 0.0);
   stream.finish();

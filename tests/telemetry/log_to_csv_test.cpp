@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "catch.hpp"
+#include "files/result_file.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/log_outlet.hpp"
@@ -33,8 +34,8 @@ void put(const fs::path& path, const std::string& bytes) { std::ofstream(path, s
 void record(const fs::path& log_path, const fs::path& csv_path, std::uint64_t cycles = 1200) {
   LogOutlet log(log_path, 1'000'000);
   CsvSink csv(csv_path);
-  MessageStream stream({}, {"paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"},
-                       {});
+  MessageStream stream(
+      {}, {{0, 0, "paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"}}, {});
   stream.add(log);
   for (std::uint64_t n = 0; n < cycles; ++n) {
     rig::CycleRecord r = test::sample_record(n);
@@ -105,17 +106,15 @@ TEST_CASE("names of phases and signals follow the columns of --csv as they do th
 
 TEST_CASE("unknown types and damaged messages are kept as hexadecimal digits") {
   const abs_hil::test::TemporaryFolder scratch;
-  {
-    EventLogWriter log(scratch / "odd.lcmlog");
-    telemetry_t m{};
-    EncodeBuffer buffer;
-    const auto bytes = buffer.encode(m);
-    log.write({.number = 0, .timestamp_us = 5, .channel = "OTHER", .data = {1, 2, 3, 0xFF}});
-    log.write({.number = 4, .timestamp_us = -5, .channel = "ABS_TELEMETRY", .data = {bytes.begin(), bytes.end()}});
-    log.write({.number = 5, .timestamp_us = 6, .channel = "ABS_TELEMETRY", .data = {bytes.begin(), bytes.end() - 1}});
-    log.write({.number = 9, .timestamp_us = 7, .channel = "EMPTY", .data = {}});
-    log.finish();
-  }
+  telemetry_t m{};
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(m);
+  std::string log;
+  append_event(log, 0, 5, "OTHER", std::vector<std::uint8_t>{1, 2, 3, 0xFF});
+  append_event(log, 4, -5, "ABS_TELEMETRY", bytes);
+  append_event(log, 5, 6, "ABS_TELEMETRY", bytes.first(bytes.size() - 1));
+  append_event(log, 9, 7, "EMPTY", {});
+  files::write_result(scratch / "odd.lcmlog", "event log", log);
   const ConversionCounts counts = log_to_csv(scratch / "odd.lcmlog", scratch / "odd.csv");
   CHECK(counts.events == 4);
   CHECK(counts.raw == 3);
@@ -132,10 +131,9 @@ TEST_CASE("a log with another number of rigs keeps each channel in a file of its
   telemetry_t m{};
   EncodeBuffer buffer;
   const auto bytes = buffer.encode(m);
-  const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
-  EventLogWriter log(scratch / "two.lcmlog");
-  for (int n = 0; n < 6; ++n) log.write({n, n, n % 2 == 0 ? "A_TELEMETRY" : "B/TELEMETRY", data});
-  log.finish();
+  std::string log;
+  for (int n = 0; n < 6; ++n) append_event(log, n, n, n % 2 == 0 ? "A_TELEMETRY" : "B/TELEMETRY", bytes);
+  files::write_result(scratch / "two.lcmlog", "event log", log);
   CHECK(log_to_csv(scratch / "two.lcmlog", scratch / "two.csv").raw == 0);
   CHECK(fs::exists(scratch / "two.B_TELEMETRY.csv"));
   CHECK(lines_of(scratch / "two.B_TELEMETRY.csv").size() == 4);
@@ -147,14 +145,13 @@ TEST_CASE("channels whose names make the same file name get files of their own")
   telemetry_t m{};
   EncodeBuffer buffer;
   const auto bytes = buffer.encode(m);
-  const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
-  EventLogWriter log(scratch / "many.lcmlog");
+  std::string log;
   std::int64_t n = 0;
   for (const char* channel : {"MAIN", "A/B/C", "A_B/C", "A/B_C", "A_B_C"}) {
-    log.write({n, n, channel, data});
+    append_event(log, n, n, channel, bytes);
     ++n;
   }
-  log.finish();
+  files::write_result(scratch / "many.lcmlog", "event log", log);
   CHECK(log_to_csv(scratch / "many.lcmlog", scratch / "many.csv").events == 5);
   std::size_t files = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(scratch / "many.csv").parent_path())) {

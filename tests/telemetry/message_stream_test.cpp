@@ -13,7 +13,7 @@ namespace abs_hil::telemetry {
 namespace {
 
 ExperimentInfo info() {
-  return {"paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0", {}};
+  return {{0, 0, "paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0"}, {}};
 }
 
 template <class Message>

@@ -63,7 +63,7 @@ class SequenceChecker {
 int publish(const std::string& url, std::uint64_t count, int period_us, const char* log_path) {
   LcmOutlet outlet(url);
   LogOutlet log(log_path);
-  MessageStream stream({}, {"paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}, {});
+  MessageStream stream({}, {{0, 0, "paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}}, {});
   stream.add(outlet);
   stream.add(log);
   CommandListener listener(outlet, stream, {});

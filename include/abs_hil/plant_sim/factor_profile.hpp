@@ -47,7 +47,7 @@ class FactorProfile {
  private:
   Axis axis_{Axis::time};
   bool from_braking_{false};
-  std::vector<Piece> pieces_;
+  std::vector<Piece> pieces_{Piece{}};
 };
 
 }  // namespace abs_hil::plant_sim

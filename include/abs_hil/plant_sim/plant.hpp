@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 
 #include "abs_hil/plant_sim/drift.hpp"
 #include "abs_hil/plant_sim/options.hpp"
@@ -12,8 +12,6 @@
 #include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
-
-class BrakePath;
 
 /// Inputs of the plant, constant during `advance`.
 struct PlantInput {
@@ -48,10 +46,6 @@ class Plant {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
-  ~Plant();
-  Plant(const Plant& other);
-  Plant(Plant&& other) noexcept;
-  Plant& operator=(Plant other) noexcept;
 
   /// Sets the state, joins the wheels and returns every profile to its start.
   void reset(const PlantState& state) noexcept;
@@ -92,7 +86,7 @@ class Plant {
   Drift drift_;
   WheelModel model_;
   PlantState state_{};
-  std::unique_ptr<BrakePath> brake_path_;  ///< null: the brake has none of the flaws
+  std::optional<BrakePath> brake_path_{};  ///< none: the brake has none of the flaws
 };
 
 }  // namespace abs_hil::plant_sim

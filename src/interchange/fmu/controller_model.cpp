@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "abs_hil/control/registry.hpp"
@@ -17,41 +16,18 @@ namespace {
 /// Longest braking that a plan allows, s.
 constexpr double longest_s = 600.0;
 
-rig::OptionFacts speed_facts(std::string_view meaning) {
-  return {.unit = "rad/s", .meaning = meaning, .range = rig::between(-2000, 2000)};
-}
-
 }  // namespace
 
 ControllerModel::ControllerModel() {
-  add_parameters(control, "control.", [](std::string_view name) { return name != "control.foreign.mapping"; });
-  add_parameters(model, "model.");
-  add_parameters(experiment, "experiment.",
-                 [](std::string_view name) { return name == "experiment.start_speed_rad_s"; });
-  add_parameters(board, "driver.sim.");
-  add_parameters(sensors, "sensors.");
-  constexpr rig::Range any{.least = std::numeric_limits<std::int32_t>::min(),
-                           .most = std::numeric_limits<std::int32_t>::max()};
-  add(Causality::input, "upper_counts", {.meaning = "encoder counter of the upper, braked wheel", .range = any},
-      &upper_counts_);
-  add(Causality::input, "lower_counts", {.meaning = "encoder counter of the lower wheel, the road", .range = any},
-      &lower_counts_);
-  add(Causality::input, "omega1_rad_s", speed_facts("speed of the upper wheel, if sensors.speeds_given"),
-      &omega1_rad_s_);
-  add(Causality::input, "omega2_rad_s", speed_facts("speed of the lower wheel, if sensors.speeds_given"),
-      &omega2_rad_s_);
-  add(Causality::output, "brake_torque_ref_Nm", {.unit = "N m", .meaning = "brake torque asked for, after limiting"},
-      &brake_torque_ref_Nm_);
-  add(Causality::output, "brake_duty", {.meaning = "brake PWM, on the board's steps"}, &brake_duty_);
-  add(Causality::output, "omega1_est_rad_s", {.unit = "rad/s", .meaning = "estimated speed of the upper wheel"},
-      &omega1_est_rad_s_);
-  add(Causality::output, "omega2_est_rad_s", {.unit = "rad/s", .meaning = "estimated speed of the lower wheel"},
-      &omega2_est_rad_s_);
-  add(Causality::output, "slip_est", {.meaning = "slip from the estimated speeds"}, &slip_est_);
-  add(Causality::output, "theta_est_N", {.unit = "N", .meaning = "estimated peak tyre force; 0 if the law has none"},
-      &theta_est_N_);
-  add(Causality::output, "brake_torque_est_Nm", {.unit = "N m", .meaning = "brake torque estimated to act"},
-      &estimated_torque_Nm_);
+  add(Causality::parameter, control, "control.",
+      [](std::string_view name) { return name != "control.foreign.mapping"; });
+  add(Causality::parameter, model, "model.");
+  add(Causality::parameter, experiment, "experiment.",
+      [](std::string_view name) { return name == "experiment.start_speed_rad_s"; });
+  add(Causality::parameter, board, "driver.sim.");
+  add(Causality::parameter, sensors, "sensors.");
+  add(Causality::input, inputs_);
+  add(Causality::output, outputs_);
 }
 
 void ControllerModel::start(double time_s) {
@@ -68,8 +44,7 @@ void ControllerModel::start(double time_s) {
   latch_ = {};
   slip_ref_tuned_ = gains_tuned_ = false;
   start_s_ = time_s_ = time_s;
-  brake_torque_ref_Nm_ = brake_duty_ = estimated_torque_Nm_ = slip_est_ = theta_est_N_ = 0.0;
-  omega1_est_rad_s_ = omega2_est_rad_s_ = experiment.start_speed_rad_s;
+  outputs_ = {.omega1_est_rad_s = experiment.start_speed_rad_s, .omega2_est_rad_s = experiment.start_speed_rad_s};
 }
 
 bool ControllerModel::tunable(const Variable& parameter) const {
@@ -117,8 +92,9 @@ void ControllerModel::step(double duration_s) {
   if (gains_tuned_ || slip_ref_tuned_) tune();
   const std::int64_t now_ns = std::llround((time_s_ - start_s_) * static_cast<double>(rig::ns_per_s));
   rig::CycleRecord record{.stamp_ns = now_ns};
-  rig::Measurement measurement{.time_ns = now_ns, .upper_counts = upper_counts_, .lower_counts = lower_counts_};
-  if (sensors.speeds_given) measurement.ideal_speeds = rig::WheelSpeeds{omega1_rad_s_, omega2_rad_s_};
+  rig::Measurement measurement{
+      .time_ns = now_ns, .upper_counts = inputs_.upper_counts, .lower_counts = inputs_.lower_counts};
+  if (sensors.speeds_given) measurement.ideal_speeds = rig::WheelSpeeds{inputs_.omega1_rad_s, inputs_.omega2_rad_s};
   const rig::Command wanted = logic_->step(measurement, latch_, record);
   if (logic_->finished() || latch_.fault() != rig::Reason::none) {
     throw std::invalid_argument("the controller gave an output that is not a finite number, or " +
@@ -127,20 +103,18 @@ void ControllerModel::step(double duration_s) {
   const rig::Command sent = grid_.as_sent(wanted);
   logic_->commanded(sent);
   time_s_ += duration_s;
-  brake_torque_ref_Nm_ = sent.brake_torque_Nm;
-  brake_duty_ = sent.brake_duty;
-  omega1_est_rad_s_ = record.control.speeds_est.omega1_rad_s;
-  omega2_est_rad_s_ = record.control.speeds_est.omega2_rad_s;
-  slip_est_ = record.control.slip_est;
-  theta_est_N_ = std::isnan(record.control.theta_est_N) ? 0.0 : record.control.theta_est_N;
-  estimated_torque_Nm_ = record.control.brake_torque_est_Nm;
+  outputs_ = {.brake_torque_ref_Nm = sent.brake_torque_Nm,
+              .brake_duty = sent.brake_duty,
+              .omega1_est_rad_s = record.control.speeds_est.omega1_rad_s,
+              .omega2_est_rad_s = record.control.speeds_est.omega2_rad_s,
+              .slip_est = record.control.slip_est,
+              .theta_est_N = std::isnan(record.control.theta_est_N) ? 0.0 : record.control.theta_est_N,
+              .brake_torque_est_Nm = record.control.brake_torque_est_Nm};
 }
 
 void ControllerModel::exchange_state(rig::StateBytes& state) {
   logic_->exchange_state(state);
-  state(latch_, start_s_, time_s_, slip_ref_tuned_, gains_tuned_);
-  state(brake_torque_ref_Nm_, brake_duty_, omega1_est_rad_s_, omega2_est_rad_s_, slip_est_, theta_est_N_,
-        estimated_torque_Nm_);
+  state(latch_, start_s_, time_s_, slip_ref_tuned_, gains_tuned_, outputs_);
 }
 
 }  // namespace abs_hil::interchange::fmu

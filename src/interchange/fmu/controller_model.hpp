@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "abs_hil/control/options.hpp"
@@ -18,6 +19,30 @@ struct ControllerSensors {
   ABS_HIL_OPTION(bool, speeds_given, false,
                  .meaning = "the controller takes omega1_rad_s and omega2_rad_s instead of counts");
   ABS_HIL_OPTION(bool, ideal_actuator, false, .meaning = "the torque asked for acts at once");
+};
+
+struct ControllerInputs {
+  ABS_HIL_OPTIONS(ControllerInputs);
+  static constexpr rig::Range any{.least = std::numeric_limits<std::int32_t>::min(),
+                                  .most = std::numeric_limits<std::int32_t>::max()};
+  ABS_HIL_OPTION(std::int32_t, upper_counts, 0, .meaning = "encoder counter of the upper, braked wheel", .range = any);
+  ABS_HIL_OPTION(std::int32_t, lower_counts, 0, .meaning = "encoder counter of the lower wheel, the road",
+                 .range = any);
+  ABS_HIL_OPTION(double, omega1_rad_s, 0.0, .unit = "rad/s",
+                 .meaning = "speed of the upper wheel, if sensors.speeds_given", .range = rig::between(-2000, 2000));
+  ABS_HIL_OPTION(double, omega2_rad_s, 0.0, .unit = "rad/s",
+                 .meaning = "speed of the lower wheel, if sensors.speeds_given", .range = rig::between(-2000, 2000));
+};
+
+struct ControllerOutputs {
+  ABS_HIL_OPTIONS(ControllerOutputs);
+  ABS_HIL_OPTION(double, brake_torque_ref_Nm, 0.0, .unit = "N m", .meaning = "brake torque asked for, after limiting");
+  ABS_HIL_OPTION(double, brake_duty, 0.0, .meaning = "brake PWM, on the board's steps");
+  ABS_HIL_OPTION(double, omega1_est_rad_s, 0.0, .unit = "rad/s", .meaning = "estimated speed of the upper wheel");
+  ABS_HIL_OPTION(double, omega2_est_rad_s, 0.0, .unit = "rad/s", .meaning = "estimated speed of the lower wheel");
+  ABS_HIL_OPTION(double, slip_est, 0.0, .meaning = "slip from the estimated speeds");
+  ABS_HIL_OPTION(double, theta_est_N, 0.0, .unit = "N", .meaning = "estimated peak tyre force; 0 if the law has none");
+  ABS_HIL_OPTION(double, brake_torque_est_Nm, 0.0, .unit = "N m", .meaning = "brake torque estimated to act");
 };
 
 /// A slip controller with its observers and its estimate of the brake: the logic of a run's braking, without the
@@ -47,17 +72,8 @@ class ControllerModel final : public Model {
   driver::OutputGrid grid_{};
   double start_s_{0.0};
   double time_s_{0.0};
-  std::int32_t upper_counts_{0};
-  std::int32_t lower_counts_{0};
-  double omega1_rad_s_{0.0};
-  double omega2_rad_s_{0.0};
-  double brake_torque_ref_Nm_{0.0};
-  double brake_duty_{0.0};
-  double omega1_est_rad_s_{0.0};
-  double omega2_est_rad_s_{0.0};
-  double slip_est_{0.0};
-  double theta_est_N_{0.0};
-  double estimated_torque_Nm_{0.0};
+  ControllerInputs inputs_{};
+  ControllerOutputs outputs_{};
 };
 
 }  // namespace abs_hil::interchange::fmu

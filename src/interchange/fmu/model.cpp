@@ -9,6 +9,7 @@
 #include "abs_hil/rig/option_check.hpp"
 #include "interchange/fmu/controller_model.hpp"
 #include "interchange/fmu/plant_model.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::interchange::fmu {
 
@@ -54,10 +55,9 @@ void set_text(const Variable& variable, const std::string& text) {
         } else if constexpr (std::is_same_v<Value, bool>) {
           *value = text == "true";
         } else {
-          const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-          if (error != std::errc{} || end != text.data() + text.size()) {
-            throw std::invalid_argument(variable.name + ": '" + text + "' is not a number");
-          }
+          const auto number = rig::parse_number<Value>(text);
+          if (!number) throw std::invalid_argument(variable.name + ": '" + text + "' is not a number");
+          *value = *number;
         }
       },
       variable.value);

@@ -45,17 +45,14 @@ class Model {
   virtual void exchange_state(rig::StateBytes& state) = 0;
 
  protected:
-  /// The rows of `options` as parameters; rows that `wanted` refuses are left out.
+  /// The rows of `options` as variables; rows that `wanted` refuses are left out.
   template <class Options>
-  void add_parameters(
-      Options& options, const std::string& prefix,
+  void add(
+      Causality causality, Options& options, const std::string& prefix = {},
       bool (*wanted)(std::string_view name) = [](std::string_view) { return true; }) {
     rig::for_each_option(options, prefix, [&](const std::string& name, const rig::OptionFacts& facts, auto& value) {
-      if (wanted(name)) variables_.push_back({name, facts, Causality::parameter, &value});
+      if (wanted(name)) variables_.push_back({name, facts, causality, &value});
     });
-  }
-  void add(Causality causality, std::string name, const rig::OptionFacts& facts, const rig::OptionTarget& value) {
-    variables_.push_back({std::move(name), facts, causality, value});
   }
 
  private:

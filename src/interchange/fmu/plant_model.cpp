@@ -9,38 +9,13 @@
 namespace abs_hil::interchange::fmu {
 
 PlantModel::PlantModel() {
-  add_parameters(options, "plant.");
-  add_parameters(experiment, "experiment.",
-                 [](std::string_view name) { return name == "experiment.start_speed_rad_s"; });
-  add_parameters(board, "driver.sim.");
-  add_parameters(begin, "run.");
-  add(Causality::input, "motor_duty", {.meaning = "drive PWM of the lower wheel's motor", .range = rig::between(0, 1)},
-      &motor_duty_);
-  add(Causality::input, "brake_duty", {.meaning = "brake PWM", .range = rig::between(0, 1)}, &brake_duty_);
-  add(Causality::input, "motor_enable", {.meaning = "the drive PWM is 0 while false"}, &motor_enable_);
-  add(Causality::input, "brake_torque_ref_Nm",
-      {.unit = "N m",
-       .meaning = "brake torque asked for; acts instead of brake_duty if plant.ideal_actuator",
-       .range = rig::from_zero(1000)},
-      &brake_torque_ref_Nm_);
-  add(Causality::input, "road_friction",
-      {.meaning = "friction of the road: a factor on the plant's tyre force and its friction_profile",
-       .range = rig::between(0.001, 1)},
-      &road_friction_);
-  add(Causality::output, "upper_counts", {.meaning = "encoder counter of the upper, braked wheel; wraps at 32 bit"},
-      &upper_counts_);
-  add(Causality::output, "lower_counts", {.meaning = "encoder counter of the lower wheel, the road; wraps at 32 bit"},
-      &lower_counts_);
-  add(Causality::output, "omega1_rad_s", {.unit = "rad/s", .meaning = "speed of the upper wheel"}, &omega1_rad_s_);
-  add(Causality::output, "omega2_rad_s", {.unit = "rad/s", .meaning = "speed of the lower wheel"}, &omega2_rad_s_);
-  add(Causality::output, "slip", {.meaning = "slip: 0 rolling, 1 locked, negative driven"}, &slip_);
-  add(Causality::output, "brake_torque_Nm", {.unit = "N m", .meaning = "brake torque on the upper wheel"},
-      &brake_torque_Nm_);
-  add(Causality::output, "theta_N", {.unit = "N", .meaning = "peak tyre force theta of (10)"}, &theta_N_);
-  add(Causality::output, "car_speed_m_s", {.unit = "m/s", .meaning = "speed of the lower wheel's rim"},
-      &car_speed_m_s_);
-  add(Causality::output, "distance_m", {.unit = "m", .meaning = "way of the lower wheel's rim since the start"},
-      &distance_m_);
+  add(Causality::parameter, options, "plant.");
+  add(Causality::parameter, experiment, "experiment.",
+      [](std::string_view name) { return name == "experiment.start_speed_rad_s"; });
+  add(Causality::parameter, board, "driver.sim.");
+  add(Causality::parameter, begin, "run.");
+  add(Causality::input, inputs_);
+  add(Causality::output, outputs_);
 }
 
 void PlantModel::start(double time_s) {
@@ -51,7 +26,7 @@ void PlantModel::start(double time_s) {
   start_s_ = time_s_ = time_s;
   driver_->configure();
   driver_->activate(0);
-  driver_->scale_friction(road_friction_);
+  driver_->scale_friction(inputs_.road_friction);
   read();
 }
 
@@ -60,25 +35,25 @@ void PlantModel::read() {
   static_cast<void>(
       driver_->read(std::llround((time_s_ - start_s_) * static_cast<double>(rig::ns_per_s)), measurement));
   const rig::PlantTruth truth = driver_->truth();
-  upper_counts_ = measurement.upper_counts;
-  lower_counts_ = measurement.lower_counts;
-  omega1_rad_s_ = truth.speeds.omega1_rad_s;
-  omega2_rad_s_ = truth.speeds.omega2_rad_s;
-  slip_ = truth.slip;
-  brake_torque_Nm_ = truth.brake_torque_Nm;
-  theta_N_ = truth.theta_N;
   const double r2_m = options.rig.wheels.r2_m;
-  car_speed_m_s_ = r2_m * omega2_rad_s_;
-  distance_m_ = r2_m * driver_->plant().state().angle2_rad;
+  outputs_ = {.upper_counts = measurement.upper_counts,
+              .lower_counts = measurement.lower_counts,
+              .omega1_rad_s = truth.speeds.omega1_rad_s,
+              .omega2_rad_s = truth.speeds.omega2_rad_s,
+              .slip = truth.slip,
+              .brake_torque_Nm = truth.brake_torque_Nm,
+              .theta_N = truth.theta_N,
+              .car_speed_m_s = r2_m * truth.speeds.omega2_rad_s,
+              .distance_m = r2_m * driver_->plant().state().angle2_rad};
 }
 
 void PlantModel::step(double duration_s) {
-  driver_->scale_friction(road_friction_);
+  driver_->scale_friction(inputs_.road_friction);
   rig::Command sent;
-  const driver::IoResult written = driver_->write({.motor_duty = motor_duty_,
-                                                   .brake_duty = brake_duty_,
-                                                   .motor_enable = motor_enable_,
-                                                   .brake_torque_Nm = brake_torque_ref_Nm_},
+  const driver::IoResult written = driver_->write({.motor_duty = inputs_.motor_duty,
+                                                   .brake_duty = inputs_.brake_duty,
+                                                   .motor_enable = inputs_.motor_enable,
+                                                   .brake_torque_Nm = inputs_.brake_torque_ref_Nm},
                                                   sent);
   if (!written.ok()) throw std::invalid_argument("motor_duty or brake_duty: give numbers in [0, 1]");
   time_s_ += duration_s;
@@ -87,9 +62,7 @@ void PlantModel::step(double duration_s) {
 
 void PlantModel::exchange_state(rig::StateBytes& state) {
   driver_->exchange_state(state);
-  state(start_s_, time_s_);
-  state(upper_counts_, lower_counts_, omega1_rad_s_, omega2_rad_s_, slip_, brake_torque_Nm_, theta_N_, car_speed_m_s_,
-        distance_m_);
+  state(start_s_, time_s_, outputs_);
 }
 
 }  // namespace abs_hil::interchange::fmu

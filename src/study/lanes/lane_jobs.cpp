@@ -2,6 +2,7 @@
 #include "study/lanes/lane_jobs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -119,9 +120,7 @@ struct Kind {
   bool (*begin)(const LaneSettings::Parts& parts, const Job& job, const StartingPlant& plant,
                 std::vector<double>& words);
   bool (*result)(const double* words, RunResult& result);
-  LaneKernel (*portable)();
-  LaneKernel (*avx2)();
-  LaneKernel (*avx512)();
+  std::array<LaneKernel (*)(), 4> kernels;  ///< by InstructionSet
 };
 
 namespace {
@@ -184,14 +183,13 @@ struct KindOf {
   }
 
   using Types = LaneKind<Law, Tyre, Load>;
-  static constexpr Kind kind {
-    sizeof(Run) / sizeof(double), begin, result, [] { return lane_kernel<rig::Portable, Types>(); },
 #if defined(__x86_64__)
-        [] { return lane_kernel<rig::Avx2, Types>(); }, [] { return lane_kernel<rig::Avx512, Types>(); }
+  static constexpr std::array<LaneKernel (*)(), 4> kernels{
+      nullptr, lane_kernel<rig::Portable, Types>, lane_kernel<rig::Avx2, Types>, lane_kernel<rig::Avx512, Types>};
 #else
-        nullptr, nullptr
+  static constexpr std::array<LaneKernel (*)(), 4> kernels{nullptr, lane_kernel<rig::Portable, Types>};
 #endif
-  };
+  static constexpr Kind kind{sizeof(Run) / sizeof(double), begin, result, kernels};
 };
 
 #define ABS_HIL_LANE_KIND(law, tyre, load) &KindOf<law, tyre, load>::kind,
@@ -337,15 +335,12 @@ void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::u
   std::vector<double*> words;
   for (Started& run : runs) words.push_back(run.words.data());
   std::vector<std::uint32_t> next(runs.size());
-  const auto choose = set == InstructionSet::avx512 ? kind.avx512
-                      : set == InstructionSet::avx2 ? kind.avx2
-                                                    : kind.portable;
-  choose()({.runs = words.data(),
-            .next = next.data(),
-            .count = static_cast<std::uint32_t>(runs.size()),
-            .window_cycles = window_cycles,
-            .assist = &assist,
-            .context = runs.data()});
+  kind.kernels[static_cast<std::size_t>(set)]()({.runs = words.data(),
+                                                 .next = next.data(),
+                                                 .count = static_cast<std::uint32_t>(runs.size()),
+                                                 .window_cycles = window_cycles,
+                                                 .assist = &assist,
+                                                 .context = runs.data()});
 }
 
 bool result_of(const Kind& kind, const double* words, RunResult& result) { return kind.result(words, result); }
