@@ -59,8 +59,6 @@ class UdpBoard : public RigBehind {
     if (!options.name.empty() && options.name.size() <= 16) return;
     throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
   }
-  UdpBoard(const UdpBoard&) = delete;
-  UdpBoard& operator=(const UdpBoard&) = delete;
 
   /// Obeys a datagram at the current time. Returns the answer; empty: there is none.
   [[nodiscard]] virtual std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) = 0;

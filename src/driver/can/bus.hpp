@@ -52,8 +52,6 @@ class FrameSocket {
   /// Takes ownership of an open socket. Makes it non-blocking and enables receive time stamps and the drop count.
   explicit FrameSocket(FileDescriptor descriptor) noexcept;
   explicit FrameSocket(int descriptor) noexcept : FrameSocket(FileDescriptor(descriptor)) {}
-  FrameSocket(const FrameSocket&) = delete;
-  FrameSocket& operator=(const FrameSocket&) = delete;
   virtual ~FrameSocket() = default;
 
   /// `ok`: the kernel has it; only the node's answer shows whether it reached the bus. `no_answer`: not sent, because

@@ -103,9 +103,6 @@ enum class Pwm : std::uint32_t { drive = 0, brake = 1 };
 /// or lock; each access takes as long as the bus.
 class RegisterWindow {
  public:
-  RegisterWindow() = default;
-  RegisterWindow(const RegisterWindow&) = delete;
-  RegisterWindow& operator=(const RegisterWindow&) = delete;
   virtual ~RegisterWindow() = default;
 
   /// `value` does not change on error. `IoResult::where` is the offset.

@@ -193,9 +193,6 @@ struct InterfaceSetting {
 /// before its request. As real-time safe as the system below it.
 class FrameLink {
  public:
-  FrameLink() = default;
-  FrameLink(const FrameLink&) = delete;
-  FrameLink& operator=(const FrameLink&) = delete;
   virtual ~FrameLink() = default;
 
   /// Queues a frame for the board. `no_answer`: not queued, because the board has not taken the previous ones for too
@@ -242,9 +239,6 @@ inline constexpr std::uint8_t endpoint_in = 0x84;
 /// result is -errno. As real-time safe as the kernel below it.
 class Usbfs {
  public:
-  Usbfs() = default;
-  Usbfs(const Usbfs&) = delete;
-  Usbfs& operator=(const Usbfs&) = delete;
   virtual ~Usbfs() = default;
 
   /// Opens the node for reading and writing; returns its file descriptor.
@@ -293,8 +287,7 @@ class UrbLink final : public FrameLink {
   class Node {
    public:
     Node(const UsbDevice& device, Usbfs& usbfs);
-    Node(const Node&) = delete;
-    Node& operator=(const Node&) = delete;
+    Node(Node&&) = delete;  // nor copied
     ~Node() { usbfs_.close(file_); }
     int ioctl(unsigned long request, void* argument) noexcept { return usbfs_.ioctl(file_, request, argument); }
     [[nodiscard]] std::vector<std::uint8_t> descriptors(const UsbDevice& device);
