@@ -190,7 +190,7 @@ TEST_CASE("Forged, repeated and old commands have no effect and do not feed the 
   Active rig;
   emulator::BusFrame forged{.id = 0x81, .length = 8, .data = {0x10, 0x27}};
   emulator::BusFrame old = forged;  // its check is right, its sequence was used before
-  emulator::seal(old);
+  old.seal();
   const std::int64_t commanded_ns = rig.now_ns;
   while (rig.now_ns - commanded_ns < 20 * ms) {
     CHECK(rig.node.wire().brake_duty == 0.5);
