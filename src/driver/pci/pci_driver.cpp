@@ -293,9 +293,9 @@ class PciDriver final : public BoardDriver {
     }
     if (!takes_values) return {IoError::read_back_mismatch, reg::pwm_width};
     Access card(*card_.window);
-    const std::array<std::uint32_t, settings.size()> at_activation = settings_;
+    const std::array<std::uint32_t, settings.size()> noted = settings_;
     note_settings(card);
-    const bool same = settings_ == at_activation || !card.result().ok();
+    const bool same = settings_ == noted || !card.result().ok();
     return {IoError::foreign_writer, reg::pwm_width, 0,
             same ? rig::Reason::foreign_writer : rig::Reason::board_reconfigured};
   }
