@@ -21,7 +21,7 @@ constexpr std::array<FaultName, 8> register_faults{{{"ok"},
 
 std::optional<std::uint32_t> offset_in(std::string_view digits) {
   if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
-  const auto offset = number_in<std::uint32_t>(digits, 16);
+  const auto offset = rig::parse_number<std::uint32_t>(digits, 16);
   return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
 }
 

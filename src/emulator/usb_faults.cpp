@@ -1,5 +1,4 @@
 // Faults of a USB board's transfers.
-#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -13,18 +12,8 @@ namespace {
 constexpr std::string_view valid_usb_fault =
     "ok, stall in|out [once], length BYTES (0 to 512), silent, late US [COUNT], or garbage";
 
-std::vector<std::string_view> words_of(std::string_view text) {
-  std::vector<std::string_view> words;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(' '), text.size());
-    if (end > 0) words.push_back(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return words;
-}
-
 std::int64_t at_most(std::int64_t most, std::string_view word, std::string_view whole) {
-  const auto value = number_in<std::int64_t>(word);
+  const auto value = rig::parse_number<std::int64_t>(word);
   if (!value || *value < 0 || *value > most) refuse_fault(whole, valid_usb_fault);
   return *value;
 }
@@ -32,7 +21,8 @@ std::int64_t at_most(std::int64_t most, std::string_view word, std::string_view 
 }  // namespace
 
 void UsbFaults::set(std::string_view text) {
-  const std::vector<std::string_view> words = words_of(text);
+  std::vector<std::string_view> words = rig::split(text, ' ');
+  std::erase(words, "");
   const auto is = [&words](std::string_view name, std::size_t least, std::size_t most) {
     return !words.empty() && words[0] == name && words.size() > least && words.size() <= most + 1;
   };
