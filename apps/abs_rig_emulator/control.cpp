@@ -7,10 +7,11 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
+#include <sstream>
 #include <stdexcept>
-#include <utility>
+
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
@@ -20,14 +21,8 @@ void say(const std::string& text) {
 }
 
 ControlCommand::ControlCommand(std::string_view text) : line(text) {
-  std::string word;
-  for (const char c : line + ' ') {
-    if (c != ' ' && c != '\t' && c != '\r') {
-      word += c;
-    } else if (!word.empty()) {
-      words.push_back(std::exchange(word, {}));
-    }
-  }
+  std::istringstream in(line);
+  for (std::string word; in >> word;) words.push_back(word);
 }
 
 bool ControlCommand::is(std::string_view name, std::size_t arguments) const {
@@ -35,13 +30,9 @@ bool ControlCommand::is(std::string_view name, std::size_t arguments) const {
 }
 
 double ControlCommand::number(std::size_t n) const {
-  const std::string& word = text(n);
-  double value = 0.0;
-  const auto [at, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || at != word.data() + word.size() || !std::isfinite(value)) {
-    throw std::invalid_argument("\"" + word + "\" is not a finite number");
-  }
-  return value;
+  const auto value = rig::parse_number<double>(text(n));
+  if (!value || !std::isfinite(*value)) throw std::invalid_argument("\"" + text(n) + "\" is not a finite number");
+  return *value;
 }
 
 bool ControlCommand::first_of(std::size_t n, std::string_view first, std::string_view second) const {

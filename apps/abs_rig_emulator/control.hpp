@@ -56,9 +56,6 @@ struct EmulatorOptions {
 /// A board with time, faults, logs and control commands, as the main loop sees it.
 class EmulatedBoard {
  public:
-  EmulatedBoard() = default;
-  EmulatedBoard(const EmulatedBoard&) = delete;
-  EmulatedBoard& operator=(const EmulatedBoard&) = delete;
   virtual ~EmulatedBoard() = default;
 
   /// Descriptor for poll().

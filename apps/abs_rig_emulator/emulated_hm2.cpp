@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
 
 #include "control.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
@@ -44,12 +44,9 @@ sockaddr_in address_in(const std::string& text) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   if (::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) != 1) refuse("not an IPv4 address");
-  std::uint16_t port = emulator::hm2_port;
-  if (colon != std::string::npos) {
-    const char* const end = text.data() + text.size();
-    const auto [at, error] = std::from_chars(text.data() + colon + 1, end, port);
-    if (error != std::errc() || at != end || port == 0) refuse("the port is not 1 to 65535");
-  }
+  const auto port = colon == std::string::npos ? emulator::hm2_port
+                                               : rig::parse_number<std::uint16_t>(text.substr(colon + 1)).value_or(0);
+  if (port == 0) refuse("the port is not 1 to 65535");
   address.sin_port = htons(port);
   return address;
 }

@@ -47,8 +47,6 @@ class BusSocket {
       open_can(interface);
     }
   }
-  BusSocket(const BusSocket&) = delete;
-  BusSocket& operator=(const BusSocket&) = delete;
   ~BusSocket() {
     if (!path_.empty()) ::unlink(path_.c_str());
   }

@@ -76,7 +76,7 @@ Findings check_can(const Examination& e) {
 
 Findings check_hm2(const Examination& e) {
   // It sends datagrams, so only to a board that is named.
-  if (e.driver.kind == "hm2") return scan_hm2(e.driver.of<driver::hm2::Hm2Options>());
+  if (e.driver.kind == "hm2") return scan_hm2(*e.driver.boards.find("hm2")->as<driver::hm2::Hm2Options>());
   return {{.check = "hm2", .what = "no hm2 board is configured (driver.kind)", .standing = Standing::note}};
 }
 

@@ -146,9 +146,6 @@ class BoardDriver : public RigDriver {
 /// The clock of an emulated board in lock-step: it advances only when the driver says so. No hardware has such a clock.
 class EmulatedTime {
  public:
-  EmulatedTime() = default;
-  EmulatedTime(const EmulatedTime&) = delete;
-  EmulatedTime& operator=(const EmulatedTime&) = delete;
   virtual ~EmulatedTime() = default;
 
   virtual IoResult now(std::int64_t& time_ns) noexcept = 0;

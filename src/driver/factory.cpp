@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "driver/pwm.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver {
 
@@ -78,10 +79,11 @@ ChosenBackend chosen_backend(const DriverOptions& options) {
   const auto entry = std::ranges::find(all, options.kind, &Backend::name);
   const BoardOptions* board = options.boards.find(options.kind);
   if (entry != all.end() && board != nullptr) return {*entry, *board};
-  std::string known;
-  for (const Backend& other : all) known += (known.empty() ? "" : ", ") + std::string(other.name);
+  std::vector<std::string> known;
+  for (const Backend& other : all) known.emplace_back(other.name);
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build has no driver for that board; use one of " + known + ", or --backend sim");
+                    "\": this build has no driver for that board; use one of " + rig::joined(known) +
+                    ", or --backend sim");
 }
 
 OutputGrid output_grid(const DriverOptions& options) {

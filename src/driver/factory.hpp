@@ -33,10 +33,6 @@ class AllBoardOptions {
     }
     throw std::logic_error("no registered backend has options of this type");
   }
-  template <class Options>
-  [[nodiscard]] const Options& of() const {
-    return const_cast<AllBoardOptions*>(this)->of<Options>();
-  }
 
  private:
   std::vector<std::pair<std::string_view, BoardOptions>> boards_{};
@@ -63,15 +59,6 @@ struct DriverOptions {
   double rate_Hz{1000.0};  ///< cycles per second
   std::int32_t encoder_counts_per_rev{4096};
 
-  /// The options of one backend.
-  template <class Options>
-  [[nodiscard]] Options& of() {
-    return boards.of<Options>();
-  }
-  template <class Options>
-  [[nodiscard]] const Options& of() const {
-    return boards.of<Options>();
-  }
   [[nodiscard]] RunFacts facts(bool lock_step = false) const noexcept {
     return {.lock_step = lock_step,
             .emulated = emulated,

@@ -19,7 +19,7 @@ void shift_sequences(Frames& frames, unsigned by) {
     if (frame.id == 0x9A) continue;  // ABS_IDENTITY has none
     std::uint8_t& sequence = frame.data[frame.length - 2U];
     sequence = static_cast<std::uint8_t>(sequence + by);
-    seal(frame);
+    frame.seal();
   }
 }
 
@@ -83,7 +83,7 @@ constexpr std::array<NodeFaults::Row, 16> NodeFaults::rows{{
        for (BusFrame& frame : frames) {
          if (frame.id != 0x92 && frame.id != 0x94) continue;
          frame.data[2] = static_cast<std::uint8_t>(faults.random_());
-         seal(frame);
+         frame.seal();
        }
      }},
     {{"babble=FRAMES", 0, 100, true},  // of other identifiers, and as many forged ones of its own, before each answer

@@ -1,12 +1,21 @@
+// The emulated RT-DAC4/PCI: its registers, what they do to the rig, and faults of single registers.
+
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <numbers>
+#include <optional>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
+#include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
@@ -45,23 +54,105 @@ class CardModel final : public RigBehind {
   static constexpr std::uint32_t bytes = 256;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit CardModel(const CardOptions& options);
+  explicit CardModel(const CardOptions& options)
+      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+    if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
+      throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
+    }
+    plain_[0x50 / 4] = options.velocity_period_ticks;
+    plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
+    plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
+    plain_[0xA8 / 4] = options.temperature_max_C;
+  }
 
   /// One 32-bit access at a multiple of 4 below `bytes`. Undocumented registers read 0 and ignore writes.
-  [[nodiscard]] std::uint32_t read32(std::uint32_t offset) const noexcept;
-  void write32(std::uint32_t offset, std::uint32_t value) noexcept;
+  [[nodiscard]] std::uint32_t read32(std::uint32_t offset) const noexcept {
+    const plant_sim::PlantState& s = plant().state();
+    switch (offset) {
+      case 0x00: return options_.bitstream_version;
+      case 0x04: return options_.channel_counts;
+      case 0x38: return supply_raw(options_.supply_V);
+      case 0x54: return velocity(s.omega2_rad_s);
+      case 0x58: return velocity(s.omega1_rad_s);
+      case 0x60: return pwm_index_;
+      case 0x64:
+      case 0x68:
+      case 0x6C: return read_pwm(offset);
+      case 0x80: return encoder_index_;
+      case 0x84: return reset_mask_;
+      case 0x88:
+        if (encoder_index_ >= encoder_count || (reset_mask_ >> encoder_index_ & 1U) != 0) return 0;
+        return raw_count(encoder_index_) - zero_[encoder_index_];
+      case 0xAC: return trip_flags();
+      case 0xB4: return rounded((235.0 - options_.temperature_C) / 400.0 * temperature_low_ticks);
+      case 0xB8: return temperature_low_ticks;
+      default: return offset < bytes ? plain_[offset / 4] : 0;
+    }
+  }
+  void write32(std::uint32_t offset, std::uint32_t value) noexcept {
+    switch (offset) {
+      case 0x60: pwm_index_ = value; break;
+      case 0x64:
+      case 0x68:
+      case 0x6C: write_pwm(offset, value); break;
+      case 0x80: encoder_index_ = value; break;
+      case 0x84:
+        // A counter stays at 0 while its bit is set, and counts from 0 once the bit is cleared.
+        for (std::uint32_t channel = 0; channel < encoder_count; ++channel) {
+          if (((reset_mask_ | value) >> channel & 1U) != 0) zero_[channel] = raw_count(channel);
+        }
+        reset_mask_ = value & 7U;
+        break;
+      default:
+        if (only_stores(offset)) plain_[offset / 4] = value;
+    }
+  }
 
   // Events from outside the rig, except those of the host.
   void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
   void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
-  void trip_overspeed() noexcept;
+  void trip_overspeed() noexcept {
+    overspeed_latched_ = true;
+    enforce_limits();
+  }
 
-  [[nodiscard]] Outputs outputs() const noexcept override;
-  [[nodiscard]] std::uint32_t trip_flags() const noexcept;
+  [[nodiscard]] Outputs outputs() const noexcept override {
+    if (trip_flags() != 0) return {};
+    const auto duty = [](const PwmChannel& channel) {
+      const std::uint32_t full = channel.mode == 1 ? 4095 : 255;
+      return static_cast<double>(std::min(channel.width, full)) / static_cast<double>(full);
+    };
+    return {.drive_duty = emergency_stop() ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
+  }
+  [[nodiscard]] std::uint32_t trip_flags() const noexcept {
+    const std::uint32_t supply_raw_now = supply_raw(options_.supply_V);
+    const bool supply_low = supply_raw_now == 0 || (plain_[0xA4 / 4] != 0 && supply_raw_now > plain_[0xA4 / 4]);
+    const bool too_hot = options_.temperature_C > static_cast<double>(plain_[0xA8 / 4]);
+    const std::uint32_t temperature_bit = 2U - options_.overspeed_bit;
+    return (supply_low ? 2U : 0U) | (overspeed_latched_ ? 1U << options_.overspeed_bit : 0U) |
+           (too_hot ? 1U << temperature_bit : 0U);
+  }
   /// The width registers, before mode, interlocks and E-stop.
   [[nodiscard]] const PwmWidths& pwm_widths() const noexcept { return widths_; }
 
  private:
+  static constexpr double clock_Hz = 40e6;
+  static constexpr double lines_per_rev = 1024.0;
+  static constexpr double supply_scale_V = 92000.0;
+  /// Sensor pulse, low time; the ratio of high to low time carries the temperature.
+  static constexpr std::uint32_t temperature_low_ticks = 100'000;
+
+  static std::uint32_t rounded(double value) noexcept {
+    return static_cast<std::uint32_t>(std::llround(std::clamp(value, 0.0, 4.0e9)));
+  }
+
+  /// Digital I/O, velocity period, start resistors, limits: not known whether the host may write them. Here it may.
+  static constexpr bool only_stores(std::uint32_t offset) noexcept {
+    return (offset >= 0x40 && offset <= 0x50) || offset == 0x5C || (offset >= 0x90 && offset <= 0xA8);
+  }
+
+  static std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(supply_scale_V / volts) : 0; }
+
   struct PwmChannel {
     std::uint32_t mode{1};
     std::uint32_t prescaler{60};
@@ -70,12 +161,46 @@ class CardModel final : public RigBehind {
   static constexpr std::uint32_t pwm_count = 2;
   static constexpr std::uint32_t encoder_count = 3;
 
-  void note_widths(std::int64_t written_ns) noexcept;
-  [[nodiscard]] std::uint32_t read_pwm(std::uint32_t offset) const noexcept;
-  void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept;
-  [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept;
-  [[nodiscard]] std::uint32_t velocity(double omega_rad_s) const noexcept;
-  void enforce_limits() noexcept;
+  void note_widths(std::int64_t written_ns) noexcept {
+    const bool were_zero = widths_.drive == 0 && widths_.brake == 0;
+    widths_.drive = pwm_[0].width;
+    widths_.brake = pwm_[1].width;
+    widths_.last_written_ns = written_ns;
+    if (!were_zero) widths_.zero_since_ns = time_ns();
+  }
+  [[nodiscard]] std::uint32_t read_pwm(std::uint32_t offset) const noexcept {
+    if (pwm_index_ >= pwm_count) return 0;
+    const PwmChannel& channel = pwm_[pwm_index_];
+    if (offset == 0x64) return channel.mode;
+    return offset == 0x68 ? channel.prescaler : channel.width;
+  }
+  void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
+    if (pwm_index_ >= pwm_count) return;
+    PwmChannel& channel = pwm_[pwm_index_];
+    if (offset == 0x64) {
+      channel.mode = value & 1U;
+    } else if (offset == 0x68) {
+      channel.prescaler = value & 0xFFFFU;
+    } else if (!options_.trip_clears_width || trip_flags() == 0) {
+      channel.width = value & 0xFFFU;
+    }
+    if (offset == 0x6C) note_widths(time_ns());
+  }
+  [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept {
+    // 0 is the lower wheel, 1 the upper wheel, 2 the lever, which is at rest.
+    return channel < 2 ? static_cast<std::uint32_t>(position(channel == 1)) : 0;
+  }
+  [[nodiscard]] std::uint32_t velocity(double omega_rad_s) const noexcept {
+    const double lines_per_s = std::abs(omega_rad_s) / (2.0 * std::numbers::pi) * lines_per_rev;
+    return std::min(rounded(lines_per_s * static_cast<double>(plain_[0x50 / 4]) / clock_Hz), 0xFFFFU);
+  }
+  void enforce_limits() noexcept {
+    latch_overspeed(velocity(fastest_rad_s()) > plain_[0x5C / 4]);
+    if (options_.trip_clears_width && trip_flags() != 0) {
+      for (PwmChannel& channel : pwm_) channel.width = 0;
+      note_widths(widths_.last_written_ns);
+    }
+  }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { enforce_limits(); }
 
   CardOptions options_;
@@ -118,21 +243,85 @@ class FaultyCard {
   FaultyCard(CardModel& card, std::uint64_t seed) : card_(card), random_(seed) {}
 
   /// Begins or (`ok`) ends a fault of the register at `offset`.
-  void set(std::uint32_t offset, const Fault& fault);
+  void set(std::uint32_t offset, const Fault& fault) {
+    faults_.erase(offset);
+    if (fault.kind != FaultKind::ok) faults_[offset] = {.fault = fault, .stuck_at = card_.read32(offset)};
+  }
   /// Sets a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid faults.
-  void set(std::string_view text);
+  void set(std::string_view text) {
+    const std::size_t colon = text.find(':');
+    const auto offset = colon == std::string_view::npos ? std::nullopt : offset_in(text.substr(0, colon));
+    const auto given = offset ? fault_in(text.substr(colon + 1), register_faults) : std::nullopt;
+    if (!given) {
+      refuse_fault(text, "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of " +
+                             usages_of(register_faults, ", "));
+    }
+    set(*offset, {.kind = static_cast<FaultKind>(given->place), .parameter = given->number});
+  }
   void answer_all_ones(bool on) noexcept { all_ones_ = on; }
 
-  AccessResult read32(std::uint32_t offset);
-  AccessResult write32(std::uint32_t offset, std::uint32_t value);
+  AccessResult read32(std::uint32_t offset) {
+    using enum FaultKind;
+    if (all_ones_) return {.value = ~0U};
+    AccessResult result{.value = card_.read32(offset)};
+    const auto found = faults_.find(offset);
+    if (found == faults_.end()) return result;
+    State& state = found->second;
+    if (fails(state.fault)) return {.failed = true};
+    switch (state.fault.kind) {
+      case stuck: result.value = state.stuck_at; break;
+      case wrong: result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(state.fault.parameter)); break;
+      case slow: result.delay_ns = static_cast<std::int64_t>(state.fault.parameter * 1e3); break;
+      case garbage: result.value = static_cast<std::uint32_t>(random_() >> 32U); break;
+      case delayed:
+        state.earlier.push_back(result.value);
+        result.value = state.earlier.front();
+        if (static_cast<double>(state.earlier.size()) > state.fault.parameter) state.earlier.pop_front();
+        break;
+      default: break;
+    }
+    return result;
+  }
+  AccessResult write32(std::uint32_t offset, std::uint32_t value) {
+    if (all_ones_) return {};  // the card is not on the bus: the write is lost
+    AccessResult result;
+    if (const auto found = faults_.find(offset); found != faults_.end()) {
+      const Fault& fault = found->second.fault;
+      if (fails(fault)) return {.failed = true};
+      if (fault.kind == FaultKind::stuck) return {};
+      if (fault.kind == FaultKind::slow) result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3);
+    }
+    card_.write32(offset, value);
+    return result;
+  }
 
  private:
+  // In the order of FaultKind.
+  static constexpr std::array<FaultName, 8> register_faults{{{"ok"},
+                                                             {"stuck"},
+                                                             {"wrong=ADDEND", -2147483648.0, 2147483648.0},
+                                                             {"slow=US", 0.0, 10e6},
+                                                             {"delayed=READS", 1.0, 1e5},
+                                                             {"intermittent=PROBABILITY", 0.0, 1.0},
+                                                             {"off"},
+                                                             {"garbage"}}};
+
+  static std::optional<std::uint32_t> offset_in(std::string_view digits) {
+    if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
+    const auto offset = rig::parse_number<std::uint32_t>(digits, 16);
+    return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
+  }
+
   struct State {
     Fault fault{};
     std::uint32_t stuck_at{0};
     std::deque<std::uint32_t> earlier{};
   };
-  [[nodiscard]] bool fails(const Fault& fault);
+  [[nodiscard]] bool fails(const Fault& fault) {
+    using enum FaultKind;
+    if (fault.kind == off) return true;
+    return fault.kind == intermittent && static_cast<double>(random_() >> 11U) * 0x1p-53 < fault.parameter;
+  }
 
   CardModel& card_;
   std::mt19937_64 random_;

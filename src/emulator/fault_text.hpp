@@ -2,7 +2,6 @@
 
 #pragma once
 
-#include <charconv>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -10,20 +9,13 @@
 #include <string>
 #include <string_view>
 
+#include "rig/formatted_text.hpp"
+
 namespace abs_hil::emulator {
 
 /// Throws the error of every emulator for an unknown fault.
 [[noreturn]] inline void refuse_fault(std::string_view text, std::string_view valid) {
   throw std::invalid_argument("fault \"" + std::string(text) + "\": give " + std::string(valid));
-}
-
-/// Parses all of `text` as a number; `base` (2 to 36) is only for integers.
-template <typename Number, typename... Base>
-[[nodiscard]] std::optional<Number> number_in(std::string_view text, Base... base) {
-  Number value{};
-  const char* const end = text.data() + text.size();
-  const auto [at, error] = std::from_chars(text.data(), end, value, base...);
-  return error == std::errc() && at == end ? std::optional(value) : std::nullopt;
 }
 
 /// A fault by its name, which "=WHAT" follows if it takes a number.
@@ -57,9 +49,9 @@ struct GivenFault {
     if (name.name() != text.substr(0, equals) || name.takes_number() != (equals != std::string_view::npos)) continue;
     if (!name.takes_number()) return GivenFault{place};
     const std::string_view digits = text.substr(equals + 1);
-    const auto number = number_in<double>(digits);
+    const auto number = rig::parse_number<double>(digits);
     if (!number || !(*number >= name.least && *number <= name.most)) return std::nullopt;
-    if (name.whole && !number_in<unsigned>(digits)) return std::nullopt;
+    if (name.whole && !rig::parse_number<unsigned>(digits)) return std::nullopt;
     return GivenFault{place, *number};
   }
   return std::nullopt;

@@ -2,7 +2,11 @@
 
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,7 +69,10 @@ class OutputLog {
 inline constexpr double standstill_rad_s = 0.5;
 
 /// Converts revolutions per minute to rad/s.
-[[nodiscard]] double rad_s_of_rpm(double rpm) noexcept;
+[[nodiscard]] inline double rad_s_of_rpm(double rpm) noexcept {
+  constexpr double seconds_per_minute = 60.0;
+  return rpm * 2.0 * std::numbers::pi / seconds_per_minute;
+}
 
 /// Wheels, encoders, time and E-stop. A board derives from it and gives its outputs.
 class RigBehind {
@@ -73,18 +80,40 @@ class RigBehind {
   static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the board's interlocks run at 10 kHz
 
   /// Both wheels start at the same speed. Throws std::invalid_argument unless it is finite and >= 0.
-  RigBehind(const plant_sim::PlantOptions& plant, double start_speed_rad_s);
+  RigBehind(const plant_sim::PlantOptions& plant, double start_speed_rad_s)
+      : plant_(plant), upper_(plant_sim::upper_encoder(plant)), lower_(plant_sim::lower_encoder(plant)) {
+    if (!(start_speed_rad_s >= 0.0) || !std::isfinite(start_speed_rad_s)) {
+      throw std::invalid_argument("start speed " + std::to_string(start_speed_rad_s) +
+                                  " rad/s: give a finite value >= 0");
+    }
+    plant_.reset({.omega1_rad_s = start_speed_rad_s, .omega2_rad_s = start_speed_rad_s});
+  }
   virtual ~RigBehind() = default;
 
   /// Duties that now reach the power stage.
   [[nodiscard]] virtual Outputs outputs() const noexcept = 0;
   /// Advances the rig to `time_ns` (0 at power-on); an earlier time does nothing. Steps end on multiples of `step_ns`,
   /// independent of the times of the host's accesses.
-  void advance_to(std::int64_t time_ns);
+  void advance_to(std::int64_t time_ns) {
+    while (time_ns_ < time_ns) {
+      const std::int64_t from_ns = time_ns_;
+      const plant_sim::PlantState before = plant_.state();
+      const std::int64_t next_ns = step_end_ns(std::min(time_ns, (from_ns / step_ns + 1) * step_ns));
+      const Outputs out = outputs();
+      plant_.advance(static_cast<double>(next_ns - from_ns) * 1e-9,
+                     {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+      time_ns_ = next_ns;
+      after_step(before, from_ns);
+    }
+  }
 
   virtual void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }  ///< cuts the drive only
   /// Turns a standing wheel by hand.
-  virtual void turn_by_hand(bool upper_wheel, double revolutions);
+  virtual void turn_by_hand(bool upper_wheel, double revolutions) {
+    plant_sim::PlantState state = plant_.state();
+    (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
+    plant_.reset(state);
+  }
 
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
   /// True speeds and torques for the emulator's own log; the board does not show them.
@@ -101,10 +130,18 @@ class RigBehind {
   virtual void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) {}
 
   /// Counts of an encoder that does not wrap: of its wheel now, and at any angle.
-  [[nodiscard]] std::int64_t position(bool upper_wheel) const noexcept;
-  [[nodiscard]] std::int64_t position_at(bool upper_wheel, double angle_rad) const noexcept;
+  [[nodiscard]] std::int64_t position(bool upper_wheel) const noexcept {
+    const plant_sim::PlantState& s = plant_.state();
+    return position_at(upper_wheel, upper_wheel ? s.angle1_rad : s.angle2_rad);
+  }
+  [[nodiscard]] std::int64_t position_at(bool upper_wheel, double angle_rad) const noexcept {
+    return (upper_wheel ? upper_ : lower_).position(angle_rad);
+  }
   /// Absolute speed of the faster wheel.
-  [[nodiscard]] double fastest_rad_s() const noexcept;
+  [[nodiscard]] double fastest_rad_s() const noexcept {
+    const plant_sim::PlantState& s = plant_.state();
+    return std::max(std::abs(s.omega1_rad_s), std::abs(s.omega2_rad_s));
+  }
   /// The overspeed interlock of a board: it stays on until the wheels stand.
   void latch_overspeed(bool too_fast) noexcept {
     overspeed_latched_ = too_fast || (overspeed_latched_ && fastest_rad_s() >= standstill_rad_s);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/options.hpp"
+#include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
@@ -59,8 +60,6 @@ class UdpBoard : public RigBehind {
     if (!options.name.empty() && options.name.size() <= 16) return;
     throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
   }
-  UdpBoard(const UdpBoard&) = delete;
-  UdpBoard& operator=(const UdpBoard&) = delete;
 
   /// Obeys a datagram at the current time. Returns the answer; empty: there is none.
   [[nodiscard]] virtual std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) = 0;
@@ -122,19 +121,80 @@ class Hm2Link {
   explicit Hm2Link(std::uint64_t seed) : random_(seed) {}
 
   /// Sets a fault such as "loss=5". Throws std::invalid_argument with the valid faults.
-  void set(std::string_view text);
+  void set(std::string_view text) {
+    // In the order of Kind.
+    static constexpr std::array<FaultName, 10> names{{{"ok"},
+                                                      {"loss=PERCENT", 0, 100},
+                                                      {"lose-requests=N", 0, 1e6},
+                                                      {"lose-answers=N", 0, 1e6},
+                                                      {"delay=US", 0, 1e7},
+                                                      {"reorder"},
+                                                      {"duplicate"},
+                                                      {"stale"},
+                                                      {"short=BYTES", 0, 1472},
+                                                      {"garbage"}}};
+    const auto given = fault_in(text, names);
+    if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
+    kind_ = static_cast<Kind>(given->place);
+    number_ = given->number;
+    kept_.reset();
+  }
   /// Pulls or plugs the cable. What was under way is lost.
-  void plug(bool in);
+  void plug(bool in) {
+    plugged_ = in;
+    waiting_.clear();
+    kept_.reset();
+  }
   [[nodiscard]] bool plugged() const noexcept { return plugged_; }
 
   /// True if the board receives the next request.
-  [[nodiscard]] bool request_arrives();
+  [[nodiscard]] bool request_arrives() { return !lost(Kind::lose_requests); }
   /// Takes the board's answer.
-  void send(Hm2Datagram answer, std::int64_t now_ns);
+  void send(Hm2Datagram answer, std::int64_t now_ns) {
+    if (lost(Kind::lose_answers)) return;
+    const auto leave = [this, now_ns](Hm2Datagram datagram) {
+      const auto later_ns = kind_ == Kind::delay ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
+      waiting_.push_back({now_ns + later_ns, std::move(datagram)});
+    };
+    switch (kind_) {
+      case Kind::reorder:
+        if (!kept_) {
+          kept_ = std::move(answer);
+          return;
+        }
+        leave(std::move(answer));
+        leave(*std::exchange(kept_, std::nullopt));
+        return;
+      case Kind::stale:
+        if (kept_) std::swap(*kept_, answer);
+        if (!kept_) kept_ = answer;
+        break;
+      case Kind::duplicate: leave(answer); break;
+      case Kind::too_short:
+        answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_)));
+        break;
+      case Kind::garbage:
+        for (std::uint8_t& byte : answer.bytes) byte = static_cast<std::uint8_t>(random_());
+        break;
+      default: break;
+    }
+    leave(std::move(answer));
+  }
   /// The answers that reach their hosts by now.
-  [[nodiscard]] std::vector<Hm2Datagram> take_due(std::int64_t now_ns);
+  [[nodiscard]] std::vector<Hm2Datagram> take_due(std::int64_t now_ns) {
+    std::vector<Hm2Datagram> due;
+    for (Waiting& waiting : waiting_) {
+      if (waiting.due_ns <= now_ns) due.push_back(std::move(waiting.answer));
+    }
+    std::erase_if(waiting_, [now_ns](const Waiting& waiting) { return waiting.due_ns <= now_ns; });
+    return due;
+  }
   /// When the next answer is due.
-  [[nodiscard]] std::optional<std::int64_t> next_due_ns() const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> next_due_ns() const noexcept {
+    std::optional<std::int64_t> next;
+    for (const Waiting& waiting : waiting_) next = std::min(next.value_or(waiting.due_ns), waiting.due_ns);
+    return next;
+  }
 
  private:
   enum class Kind : std::uint8_t {
@@ -153,7 +213,13 @@ class Hm2Link {
     std::int64_t due_ns{0};
     Hm2Datagram answer{};
   };
-  [[nodiscard]] bool lost(Kind counted);
+  [[nodiscard]] bool lost(Kind counted) {
+    if (!plugged_) return true;
+    if (kind_ == Kind::loss) return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
+    if (kind_ != counted || number_ < 1.0) return false;
+    number_ -= 1.0;
+    return true;
+  }
 
   bool plugged_{true};
   Kind kind_{Kind::ok};

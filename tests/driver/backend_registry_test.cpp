@@ -79,7 +79,7 @@ TEST_CASE("An entry brings its name, its keys, its driver, its writer and its ca
   CHECK(listed);
 
   calls.clear();
-  options.of<ShelfOptions>().port = "/dev/here";
+  options.boards.of<ShelfOptions>().port = "/dev/here";
   CHECK_THROWS_AS(make_rig_driver(options, true), Unavailable);
   CHECK(calls == std::vector<std::string>{"/dev/here lock-step"});
   CHECK(make_safe_state_writer(options)->name() == "shelf");
@@ -94,16 +94,16 @@ TEST_CASE("A copy of the options is a copy of every board's options") {
   register_shelf();
   DriverOptions options{.kind = "shelf"};
   DriverOptions copy = options;
-  copy.of<ShelfOptions>().brake_duty_max = 0.1;
-  CHECK(options.of<ShelfOptions>().brake_duty_max == 0.4);
+  copy.boards.of<ShelfOptions>().brake_duty_max = 0.1;
+  CHECK(options.boards.of<ShelfOptions>().brake_duty_max == 0.4);
   options = copy;
-  CHECK(options.of<ShelfOptions>().brake_duty_max == 0.1);
+  CHECK(options.boards.of<ShelfOptions>().brake_duty_max == 0.1);
   rig::for_each_option(copy, "driver.", [](const std::string& name, const rig::OptionFacts&, auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
       if (name == "driver.shelf.brake_duty_max") value = 0.2;
     }
   });
-  CHECK(copy.of<ShelfOptions>().brake_duty_max == 0.2);
+  CHECK(copy.boards.of<ShelfOptions>().brake_duty_max == 0.2);
 }
 
 TEST_CASE("A board that nothing could make safe has no entry") {

@@ -184,11 +184,11 @@ TEST_CASE("The grid of the options is the grid of the driver that they make") {
   for (const Backend& board : registered_backends()) {
     for (const char* mode : {"8-bit", "12-bit"}) {
       DriverOptions options{.kind = std::string(board.name)};
-      auto& pci = options.of<pci::PciOptions>();
-      auto& usb = options.of<usb::UsbOptions>();
+      auto& pci = options.boards.of<pci::PciOptions>();
+      auto& usb = options.boards.of<usb::UsbOptions>();
       pci.pwm_mode = usb.pwm_mode = mode;
-      pci.brake_duty_max = usb.brake_duty_max = options.of<can::CanOptions>().brake_duty_max =
-          options.of<hm2::Hm2Options>().brake_duty_max = 0.61;
+      pci.brake_duty_max = usb.brake_duty_max = options.boards.of<can::CanOptions>().brake_duty_max =
+          options.boards.of<hm2::Hm2Options>().brake_duty_max = 0.61;
       const auto driver = make_rig_driver(options);
       const OutputGrid grid = output_grid(options);
       CAPTURE(board.name, mode, grid.duty_steps);

@@ -78,10 +78,10 @@ struct Echo final : usb::FrameLink {
 /// Delivers frames that were made before.
 struct Recorded final : can::FrameSocket {
   Recorded(int descriptor, std::deque<can::Frame>& frames) : FrameSocket(descriptor), frames_(frames) {}
-  can::ReceiveResult receive(can::Frame& frame, std::int64_t) noexcept override {
-    if (next_ == frames_.size()) return {};
+  IoResult receive(can::Frame& frame, std::int64_t) noexcept override {
+    if (next_ == frames_.size()) return {IoError::no_answer};
     frame = frames_[next_++];
-    return {can::ReceiveOutcome::frame};
+    return {};
   }
   std::deque<can::Frame>& frames_;
   std::size_t next_{0};

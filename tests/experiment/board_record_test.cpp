@@ -21,7 +21,7 @@ struct Lab {
   test::TemporaryFolder folder{};
   driver::DriverOptions options{.kind = "pci", .records = folder.path.string()};
   RigIdentity rig{};
-  driver::pci::PciOptions& pci{options.of<driver::pci::PciOptions>()};
+  driver::pci::PciOptions& pci{options.boards.of<driver::pci::PciOptions>()};
 
   mutable std::string note{};  ///< of the record that holds
 

@@ -17,7 +17,8 @@ namespace abs_hil::experiment::test {
 using abs_hil::test::ModelCard;
 
 struct Lab {
-  explicit Lab(const driver::pci::PciOptions& options = {}) : driver(options, card.opener()) {
+  explicit Lab(const driver::pci::PciOptions& options = {})
+      : own(driver::pci::pci_driver(options, card.opener())), driver(*own) {
     person.turn = [this](bool upper) { card.model.turn_by_hand(upper, 1.0); };
     person.take_time = [this] { clock.sleep_until(clock.now_ns() + 2'000'000'000); };
     // Nothing may act while a question stands.
@@ -31,7 +32,8 @@ struct Lab {
   }
 
   ModelCard card{};
-  driver::pci::PciDriver driver;
+  std::unique_ptr<driver::RigDriver> own;
+  driver::RigDriver& driver;
   runtime::VirtualClock clock{};
   Person person{};
   Guard guard{card};

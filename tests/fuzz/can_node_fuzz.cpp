@@ -18,7 +18,7 @@ emulator::BusFrame frame_in(Input& input) {
   const unsigned own_length = frame.id == 0x80 ? 2 : 8;
   frame.length = static_cast<std::uint8_t>((kind & 2U) != 0 ? own_length : input.byte() % (frame.fd ? 65U : 9U));
   for (std::size_t i = 0; i < frame.length; ++i) frame.data[i] = input.byte();
-  if ((kind & 4U) != 0 && frame.length > 0) emulator::seal(frame);
+  if ((kind & 4U) != 0 && frame.length > 0) frame.seal();
   return frame;
 }
 
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   emulator::CanNode node({.start_speed_rad_s = 60.0});
   // Active from the start: the nonce that guards the activation is no riddle for a fuzzer to solve.
   emulator::BusFrame activation{.id = 0x82, .length = 8, .data = {2, 0x34, 0x12}};
-  emulator::seal(activation);
+  activation.seal();
   node.receive(activation);
   std::int64_t now_ns = 0;
   for (int i = 0; i < 64 && !input.empty(); ++i) {

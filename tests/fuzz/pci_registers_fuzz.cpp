@@ -56,11 +56,12 @@ bool nan_or_within(double value, double least, double most) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Input input(data, size);
   pci::PciOptions options;
-  pci::PciDriver driver(options, [&input] {
+  const auto own = pci::pci_driver(options, [&input] {
     pci::Card card{.place = "fuzzed"};
     card.window = std::make_unique<FuzzedWindow>(input);
     return card;
   });
+  RigDriver& driver = *own;
   try {
     driver.configure();
     static_cast<void>(driver.notes());

@@ -69,11 +69,12 @@ void run_driver(Input& input) {
   options.upper_sign = (flags & 8U) != 0 ? -1 : 1;
   options.enable_line = flags % 16 - 1;
   options.verify_outputs = (flags & 64U) != 0;
-  usb::UsbDriver driver(options, [&input] {
+  const auto own = usb::usb_driver(options, [&input] {
     usb::Board board{.place = "fuzzed"};
     board.link = std::make_unique<FuzzedLink>(input);
     return board;
   });
+  RigDriver& driver = *own;
   try {
     driver.configure();
     driver.activate(0);

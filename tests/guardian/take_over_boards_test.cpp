@@ -62,7 +62,8 @@ TEST_CASE("a CAN node counts as safe only once it answers") {
 TEST_CASE("a USB board whose owner fell silent is taken over and left safe") {
   for (const rig::Command& command : {driving, braking}) {
     test::ModelBoard board({.start_speed_rad_s = 30.0});
-    driver::usb::UsbDriver owner(driver::usb::UsbOptions{}, board.opener());
+    const auto own_owner = driver::usb::usb_driver(driver::usb::UsbOptions{}, board.opener());
+    driver::RigDriver& owner = *own_owner;
     drive(owner, command);
     const auto acting = [&board] { return board.model.outputs().drive_duty + board.model.outputs().brake_duty; };
     CHECK(acting() > 0.4);

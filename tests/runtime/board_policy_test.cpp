@@ -13,9 +13,9 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-driver::pci::PciOptions& pci(driver::DriverOptions& driver) { return driver.of<driver::pci::PciOptions>(); }
-driver::can::CanOptions& can(driver::DriverOptions& driver) { return driver.of<driver::can::CanOptions>(); }
-driver::usb::UsbOptions& usb(driver::DriverOptions& driver) { return driver.of<driver::usb::UsbOptions>(); }
+driver::pci::PciOptions& pci(driver::DriverOptions& driver) { return driver.boards.of<driver::pci::PciOptions>(); }
+driver::can::CanOptions& can(driver::DriverOptions& driver) { return driver.boards.of<driver::can::CanOptions>(); }
+driver::usb::UsbOptions& usb(driver::DriverOptions& driver) { return driver.boards.of<driver::usb::UsbOptions>(); }
 
 /// What a run wants of a board, and the policy's answer: empty if it is allowed.
 struct Asked {

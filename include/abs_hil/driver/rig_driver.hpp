@@ -21,9 +21,6 @@ enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed }
 /// The driver calls this before it makes its outputs safe, which may take up to `make_safe_bound_ns`. Real-time safe.
 class MakingSafeListener {
  public:
-  MakingSafeListener() = default;
-  MakingSafeListener(const MakingSafeListener&) = delete;
-  MakingSafeListener& operator=(const MakingSafeListener&) = delete;
   virtual ~MakingSafeListener() = default;
   virtual void making_safe() noexcept = 0;
 };
@@ -44,8 +41,7 @@ struct BoardIdentity {
 class RigDriver {
  public:
   RigDriver() = default;
-  RigDriver(const RigDriver&) = delete;
-  RigDriver& operator=(const RigDriver&) = delete;
+  RigDriver(RigDriver&&) = delete;  // nor copied
   virtual ~RigDriver() = default;
 
   /// Opens and checks the board. Writes nothing that could move the rig. Throws Unavailable.

@@ -15,8 +15,7 @@ namespace abs_hil::driver {
 class SafeStateWriter {
  public:
   SafeStateWriter() = default;
-  SafeStateWriter(const SafeStateWriter&) = delete;
-  SafeStateWriter& operator=(const SafeStateWriter&) = delete;
+  SafeStateWriter(SafeStateWriter&&) = delete;  // nor copied
   virtual ~SafeStateWriter() = default;
 
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;

@@ -31,12 +31,11 @@ namespace {
 
 std::int64_t ns_of(const timespec& time) noexcept { return std::int64_t{time.tv_sec} * rig::ns_per_s + time.tv_nsec; }
 
-bool is_full(int error) noexcept { return error == EAGAIN || error == EWOULDBLOCK || error == ENOBUFS; }
-
-bool is_down(int error) noexcept {
+IoResult failure(std::uint32_t where, int error) noexcept {
   // A missing interface gives ENODEV or ENXIO. A closed peer of a socket pair gives EPIPE or ECONNRESET.
-  return error == ENETDOWN || error == ENODEV || error == ENXIO || error == EPIPE || error == ECONNRESET ||
-         error == ENOTCONN || error == ECONNREFUSED;
+  const bool down = error == ENETDOWN || error == ENODEV || error == ENXIO || error == EPIPE || error == ECONNRESET ||
+                    error == ENOTCONN || error == ECONNREFUSED;
+  return {IoError::disconnected, where, error, down ? rig::Reason::can_interface_down : rig::Reason::none};
 }
 
 /// The kernel stamps with the settable clock (CLOCK_REALTIME). The age of a frame is the same on both clocks.
@@ -68,7 +67,7 @@ FrameSocket::FrameSocket(FileDescriptor descriptor) noexcept : descriptor_(std::
   ::setsockopt(descriptor_.get(), SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
 }
 
-SendResult FrameSocket::send(const Frame& frame) noexcept {
+IoResult FrameSocket::send(const Frame& frame) noexcept {
   canfd_frame raw{};
   raw.can_id = frame.id;
   raw.len = frame.length;
@@ -76,11 +75,11 @@ SendResult FrameSocket::send(const Frame& frame) noexcept {
   std::memcpy(raw.data, frame.data.data(), std::min<std::size_t>(frame.length, sizeof raw.data));
   const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
   if (::send(descriptor_.get(), &raw, size, MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(size)) return {};
-  if (is_full(errno)) return {SendOutcome::full, errno};
-  return {is_down(errno) ? SendOutcome::down : SendOutcome::failed, errno};
+  const bool full = errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS;
+  return full ? IoResult{IoError::no_answer, frame.id, errno} : failure(frame.id, errno);
 }
 
-ReceiveResult FrameSocket::take(Frame& frame) noexcept {
+IoResult FrameSocket::take(Frame& frame) noexcept {
   canfd_frame raw{};
   iovec part{&raw, sizeof raw};
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
@@ -91,12 +90,12 @@ ReceiveResult FrameSocket::take(Frame& frame) noexcept {
   message.msg_controllen = sizeof control;
   const ssize_t size = ::recvmsg(descriptor_.get(), &message, MSG_DONTWAIT);
   if (size < 0) {
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return {};
-    return {is_down(errno) ? ReceiveOutcome::down : ReceiveOutcome::failed, errno};
+    const bool none = errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+    return none ? IoResult{IoError::no_answer} : failure(id::latch, errno);
   }
-  if (size == 0) return {ReceiveOutcome::down, EPIPE};  // the peer has closed; a CAN socket never returns 0
+  if (size == 0) return failure(id::latch, EPIPE);  // the peer has closed; a CAN socket never returns 0
   const bool whole = (message.msg_flags & MSG_TRUNC) == 0;
-  if (!whole || (size != CAN_MTU && size != CANFD_MTU)) return {ReceiveOutcome::malformed};
+  if (!whole || (size != CAN_MTU && size != CANFD_MTU)) return {IoError::incomplete_answer};
   unpack(raw, static_cast<std::size_t>(size), frame);
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET) continue;
@@ -109,13 +108,13 @@ ReceiveResult FrameSocket::take(Frame& frame) noexcept {
     }
   }
   if (frame.received_ns == 0) frame.received_ns = monotonic_ns();
-  return {ReceiveOutcome::frame};
+  return {};
 }
 
-ReceiveResult FrameSocket::receive(Frame& frame, std::int64_t deadline_ns) noexcept {
+IoResult FrameSocket::receive(Frame& frame, std::int64_t deadline_ns) noexcept {
   for (;;) {
-    const ReceiveResult result = take(frame);
-    if (result.outcome != ReceiveOutcome::nothing) return result;
+    const IoResult result = take(frame);
+    if (result.error != IoError::no_answer) return result;
     const std::int64_t left_ns = deadline_ns - monotonic_ns();
     if (left_ns <= 0) return result;
     pollfd waiting{descriptor_.get(), POLLIN, 0};
@@ -132,21 +131,18 @@ void FrameSocket::drain() noexcept {
   constexpr int most_frames = 10'000;
   Frame ignored;
   for (int i = 0; i < most_frames; ++i) {
-    const ReceiveOutcome outcome = take(ignored).outcome;
-    if (outcome != ReceiveOutcome::frame && outcome != ReceiveOutcome::malformed) return;
+    const IoError error = take(ignored).error;
+    if (error != IoError::none && error != IoError::incomplete_answer) return;
   }
 }
 
 BusReport bus_report(const Frame& error_frame) noexcept {
   const std::uint32_t kind = error_frame.id;
   const unsigned controller = (kind & CAN_ERR_CRTL) != 0 ? error_frame.data[1] : 0U;
-  constexpr std::uint32_t told_apart = CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL;
   return {.bus_off = (kind & CAN_ERR_BUSOFF) != 0,
-          .restarted = (kind & CAN_ERR_RESTARTED) != 0,
           .error_passive = (controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0,
           .error_warning = (controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0,
-          .receive_overflow = (controller & CAN_ERR_CRTL_RX_OVERFLOW) != 0,
-          .other = (kind & ~told_apart) != 0};
+          .receive_overflow = (controller & CAN_ERR_CRTL_RX_OVERFLOW) != 0};
 }
 
 namespace {

@@ -30,8 +30,6 @@ struct InterfaceFacts {
   std::uint32_t data_bit_rate{0};
   std::uint32_t transmit_errors{0};
   std::uint32_t receive_errors{0};
-  std::uint32_t restart_ms{0};  ///< > 0: the kernel restarts a bus-off controller by itself
-  std::uint32_t queue_length{0};
 };
 
 /// All interfaces of type CAN, sorted by name; empty if there is none. Throws Unavailable if rtnetlink fails.
@@ -42,51 +40,27 @@ struct InterfaceFacts {
 /// The interface with this name, if any.
 [[nodiscard]] std::optional<InterfaceFacts> find_interface(const std::string& name);
 
-/// A problem that prevents the use of an interface, and the command that fixes it.
-struct InterfaceProblem {
-  std::string what{};
-  std::string fix{};
-};
-[[nodiscard]] std::optional<InterfaceProblem> problem_of(const InterfaceFacts& facts);
-
-enum class SendOutcome : std::uint8_t {
-  sent,  ///< the kernel has it; only the node's answer shows whether it reached the bus
-  full,  ///< not sent: the queue is full (EAGAIN, ENOBUFS)
-  down,  ///< the interface is down or gone, or the peer of a socket pair is
-  failed,
-};
-struct [[nodiscard]] SendResult {
-  SendOutcome outcome{SendOutcome::sent};
-  int errno_value{0};
-};
-
-enum class ReceiveOutcome : std::uint8_t {
-  frame,
-  nothing,    ///< no frame until the deadline
-  malformed,  ///< data with the wrong size for a frame; only a socket other than CAN can deliver it
-  down,       ///< as SendOutcome::down
-  failed,
-};
-struct [[nodiscard]] ReceiveResult {
-  ReceiveOutcome outcome{ReceiveOutcome::nothing};
-  int errno_value{0};
-};
+/// What prevents the use of an interface, and the command that mends it.
+[[nodiscard]] std::optional<FoundBoard::Obstacle> problem_of(const InterfaceFacts& facts);
 
 /// Sends and receives frames (`struct can_frame` or `struct canfd_frame`) on a socket that keeps message boundaries: a
 /// raw CAN socket, or for emulators and tests an AF_UNIX socket of type SOCK_SEQPACKET or SOCK_DGRAM. Only `receive`
-/// blocks, up to its deadline. `send` and `receive` are real-time safe apart from their system calls.
+/// blocks, up to its deadline. `send` and `receive` are real-time safe apart from their system calls. Both fail with
+/// `disconnected`; its reason is `can_interface_down` if the interface, or the peer of a socket pair, is down or gone.
 class FrameSocket {
  public:
   /// Takes ownership of an open socket. Makes it non-blocking and enables receive time stamps and the drop count.
   explicit FrameSocket(FileDescriptor descriptor) noexcept;
   explicit FrameSocket(int descriptor) noexcept : FrameSocket(FileDescriptor(descriptor)) {}
-  FrameSocket(const FrameSocket&) = delete;
-  FrameSocket& operator=(const FrameSocket&) = delete;
   virtual ~FrameSocket() = default;
 
-  SendResult send(const Frame& frame) noexcept;
+  /// `ok`: the kernel has it; only the node's answer shows whether it reached the bus. `no_answer`: not sent, because
+  /// the queue is full (EAGAIN, ENOBUFS).
+  IoResult send(const Frame& frame) noexcept;
+  /// `no_answer`: no frame until the deadline. `incomplete_answer`: data with the wrong size for a frame; only a socket
+  /// other than CAN can deliver it.
   /// @param deadline_ns monotonic clock; if it is in the past the call does not wait
-  virtual ReceiveResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
+  virtual IoResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
   /// Hands each frame that comes to `heard` until that returns true: then true. False at the deadline, when the bus is
   /// down, and after 1000 frames, so that a flooded bus holds nobody for ever.
   template <class Heard>
@@ -94,9 +68,9 @@ class FrameSocket {
     constexpr int most_frames = 1000;
     Frame frame;
     for (int i = 0; i < most_frames; ++i) {
-      const ReceiveOutcome outcome = receive(frame, deadline_ns).outcome;
-      if (outcome == ReceiveOutcome::malformed) continue;
-      if (outcome != ReceiveOutcome::frame) return false;
+      const IoError error = receive(frame, deadline_ns).error;
+      if (error == IoError::incomplete_answer) continue;
+      if (error != IoError::none) return false;
       if (heard(frame)) return true;
     }
     return false;
@@ -109,20 +83,19 @@ class FrameSocket {
   [[nodiscard]] bool ask_interface(ifreq& request) const noexcept;
 
  private:
-  ReceiveResult take(Frame& frame) noexcept;
+  IoResult take(Frame& frame) noexcept;
 
   FileDescriptor descriptor_;
   std::uint32_t dropped_{0};
 };
 
-/// State of the CAN controller, from an error frame of the kernel. Several members may be true at once.
+/// State of the CAN controller, from an error frame of the kernel. Several members may be true at once. Bus errors,
+/// arbitration and missing acknowledgements are not told: lasting ones show as losses.
 struct BusReport {
   bool bus_off{false};
-  bool restarted{false};
   bool error_passive{false};
   bool error_warning{false};
   bool receive_overflow{false};  ///< the controller's own queue
-  bool other{false};  ///< bus errors, arbitration, no acknowledgement: only counted; lasting ones show as losses
 };
 [[nodiscard]] BusReport bus_report(const Frame& error_frame) noexcept;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -170,7 +171,7 @@ IoResult CanDriver::activate_node() noexcept {
                                                   .nonce = identity_.nonce,
                                                   .watchdog_ms = options_.watchdog_ms,
                                                   .sequence = command_sequence_});
-  if (const IoResult result = sent(link_.socket->send(activation), id::control); !result.ok()) return result;
+  if (const IoResult result = sent(link_.socket->send(activation)); !result.ok()) return result;
   if (await_state(NodeState::active)) return {};
   return {IoError::no_answer, id::control, 0, rig::Reason::can_node_silent};
 }
@@ -203,28 +204,23 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   bucket_.reset();
 }
 
-IoResult CanDriver::sent(const SendResult& result, std::uint32_t identifier) noexcept {
-  switch (result.outcome) {
-    case SendOutcome::sent: return {};
-    case SendOutcome::full: note(Anomaly::queue_full); return {};
-    case SendOutcome::down:
-      return {IoError::disconnected, identifier, result.errno_value, rig::Reason::can_interface_down};
-    case SendOutcome::failed: break;
-  }
-  return {IoError::disconnected, identifier, result.errno_value};
+IoResult CanDriver::sent(const IoResult& result) noexcept {
+  if (result.error != IoError::no_answer) return result;
+  note(Anomaly::queue_full);
+  return {};
 }
 
 IoResult CanDriver::do_write(const rig::Command& command, rig::Command& went_out) noexcept {
   if (!driver::in_range(command)) return {IoError::command_out_of_range};
-  const SendResult sending =
+  const IoResult sending =
       send_command({.brake = grid_.brake_width(command), .drive = grid_.motor_width(command)}, command.motor_enable);
-  if (sending.outcome == SendOutcome::sent) command_sent_ = grid_.as_sent(command);
+  if (sending.ok()) command_sent_ = grid_.as_sent(command);
   went_out = command_sent_;
-  const IoResult result = sent(sending, id::command);
+  const IoResult result = sent(sending);
   return result.ok() && bucket_.tripped() ? tripped() : result;
 }
 
-SendResult CanDriver::send_command(const Duties& duties, bool drive_enable) noexcept {
+IoResult CanDriver::send_command(const Duties& duties, bool drive_enable) noexcept {
   commanded_[++command_sequence_] = duties;
   return link_.socket->send(in_format(frame_of(id::command, {.brake_duty = duties.brake,
                                                              .drive_duty = duties.drive,
@@ -234,10 +230,8 @@ SendResult CanDriver::send_command(const Duties& duties, bool drive_enable) noex
 }
 
 IoResult CanDriver::deactivate_node() noexcept {
-  const SendResult result = link_.socket->send(control_frame(Request::deactivate));
-  if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
-    return {IoError::disconnected, id::control, result.errno_value};
-  }
+  const IoResult result = link_.socket->send(control_frame(Request::deactivate));
+  if (result.error == IoError::disconnected) return {result.error, id::control, result.errno_value};
   if (await_state(NodeState::inactive)) return {};
   return {IoError::no_answer, id::control};
 }
@@ -315,19 +309,20 @@ std::vector<std::string> CanDriver::tally() const {
     return text;
   };
   std::vector<std::string> lines{
-      "CAN: " + counts({{c.cycles, " cycles"}, {c.lost, " without an answer in time"}}) +
+      "CAN: " + counts({{c.cycles, " cycles"}, {c.of(Anomaly::missing), " without an answer in time"}}) +
       formatted("; longest answer %.0f us", static_cast<double>(c.longest_answer_ns) * 1e-3)};
-  const std::uint64_t odd = c.stale + c.duplicates + c.out_of_order + c.wrong_length + c.forged + c.implausible +
-                            c.queue_full + c.error_frames + c.dropped_by_kernel + c.rejected_by_node;
+  const std::uint64_t odd = std::accumulate(c.anomalies.begin(), c.anomalies.end(), std::uint64_t{0}) -
+                            c.of(Anomaly::missing) - c.of(Anomaly::too_many) + c.error_frames + c.dropped_by_kernel +
+                            c.rejected_by_node;
   if (odd == 0) return lines;
-  lines.push_back("CAN frames: " + counts({{c.stale, " stale"},
-                                           {c.duplicates, " duplicate"},
-                                           {c.out_of_order, " out of order"},
-                                           {c.wrong_length, " of wrong length"},
-                                           {c.forged, " forged"},
-                                           {c.implausible, " implausible"},
+  lines.push_back("CAN frames: " + counts({{c.of(Anomaly::stale), " stale"},
+                                           {c.of(Anomaly::duplicate), " duplicate"},
+                                           {c.of(Anomaly::out_of_order), " out of order"},
+                                           {c.of(Anomaly::wrong_length), " of wrong length"},
+                                           {c.of(Anomaly::forged), " forged"},
+                                           {c.of(Anomaly::implausible), " implausible"},
                                            {c.dropped_by_kernel, " dropped by the kernel"}}));
-  lines.push_back("CAN bus: " + counts({{c.queue_full, " times the send queue was full"},
+  lines.push_back("CAN bus: " + counts({{c.of(Anomaly::queue_full), " times the send queue was full"},
                                         {c.error_frames, " error frames"},
                                         {c.error_warnings, " of them warnings"},
                                         {c.rejected_by_node, " commands rejected by the node"}}));

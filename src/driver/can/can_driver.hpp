@@ -32,6 +32,7 @@ enum class Anomaly : std::uint8_t {
   forged,        ///< a frame with the node's identifier and a wrong checksum
   wrong_length,
 };
+inline constexpr std::size_t anomaly_count = 10;
 
 /// The node's counters, clock and state at one SYNC.
 struct Answer {
@@ -111,20 +112,15 @@ inline constexpr std::int64_t can_make_safe_bound_ns = handshake_attempts * hand
 /// Counts of frames and cycles since `configure`.
 struct CanCounters {
   std::uint64_t cycles{0};  ///< SYNCs
-  std::uint64_t lost{0};    ///< cycles without a complete answer in time
-  std::uint64_t stale{0};   ///< this and all below count frames
-  std::uint64_t duplicates{0};
-  std::uint64_t out_of_order{0};
-  std::uint64_t wrong_length{0};
-  std::uint64_t forged{0};
-  std::uint64_t implausible{0};
-  std::uint64_t ignored{0};  ///< frames with identifiers that the node does not have
-  std::uint64_t queue_full{0};
+  std::array<std::uint64_t, anomaly_count> anomalies{};
   std::uint64_t error_frames{0};
   std::uint64_t error_warnings{0};
   std::uint64_t dropped_by_kernel{0};
   std::uint64_t rejected_by_node{0};
   std::int64_t longest_answer_ns{0};
+  [[nodiscard]] std::uint64_t of(Anomaly anomaly) const noexcept {
+    return anomalies[static_cast<std::size_t>(anomaly)];
+  }
 };
 
 using OpenLink = std::function<Link()>;
@@ -195,8 +191,8 @@ class CanDriver final : public BoardDriver {
   [[nodiscard]] bool advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept;
   [[nodiscard]] std::int64_t node_interval_ns(const Answer& answer) const noexcept;
   [[nodiscard]] std::int64_t latch_time_ns(const Answer& answer, std::int64_t now_ns) const noexcept;
-  [[nodiscard]] IoResult sent(const SendResult& result, std::uint32_t identifier) noexcept;
-  SendResult send_command(const Duties& duties, bool drive_enable) noexcept;
+  [[nodiscard]] IoResult sent(const IoResult& result) noexcept;
+  IoResult send_command(const Duties& duties, bool drive_enable) noexcept;
   [[nodiscard]] Frame in_format(Frame frame) const noexcept;
 
   CanOptions options_;

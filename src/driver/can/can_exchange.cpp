@@ -21,24 +21,22 @@ constexpr int most_answers_without = 50;
 /// timeout.
 constexpr std::int64_t clock_slack_ns = 10'000'000;
 
-/// What a lost cycle is called that an anomaly caused, and what counts it.
+/// What a lost cycle is called that an anomaly caused. By number of the anomaly.
 struct AnomalyFacts {
   IoError error;
   rig::Reason reason;
-  std::uint64_t CanCounters::*count;  ///< null: counted elsewhere
 };
-/// By number of the anomaly.
-constexpr std::array<AnomalyFacts, 10> facts_of{{
-    {IoError::no_answer, rig::Reason::can_node_silent, nullptr},
-    {IoError::no_answer, rig::Reason::can_node_silent, &CanCounters::lost},
-    {IoError::no_answer, rig::Reason::can_send_queue_full, &CanCounters::queue_full},
-    {IoError::implausible_answer, rig::Reason::can_frames_stale, &CanCounters::stale},
-    {IoError::implausible_answer, rig::Reason::can_frames_out_of_order, &CanCounters::out_of_order},
-    {IoError::implausible_answer, rig::Reason::can_frames_duplicated, &CanCounters::duplicates},
-    {IoError::no_answer, rig::Reason::can_too_many_frames, nullptr},
-    {IoError::implausible_answer, rig::Reason::can_values_implausible, &CanCounters::implausible},
-    {IoError::implausible_answer, rig::Reason::can_frames_forged, &CanCounters::forged},
-    {IoError::incomplete_answer, rig::Reason::can_frame_wrong_length, &CanCounters::wrong_length},
+constexpr std::array<AnomalyFacts, anomaly_count> facts_of{{
+    {IoError::no_answer, rig::Reason::can_node_silent},
+    {IoError::no_answer, rig::Reason::can_node_silent},
+    {IoError::no_answer, rig::Reason::can_send_queue_full},
+    {IoError::implausible_answer, rig::Reason::can_frames_stale},
+    {IoError::implausible_answer, rig::Reason::can_frames_out_of_order},
+    {IoError::implausible_answer, rig::Reason::can_frames_duplicated},
+    {IoError::no_answer, rig::Reason::can_too_many_frames},
+    {IoError::implausible_answer, rig::Reason::can_values_implausible},
+    {IoError::implausible_answer, rig::Reason::can_frames_forged},
+    {IoError::incomplete_answer, rig::Reason::can_frame_wrong_length},
 }};
 static_assert(static_cast<std::size_t>(Anomaly::wrong_length) + 1 == facts_of.size());
 
@@ -48,7 +46,7 @@ const AnomalyFacts& facts(Anomaly anomaly) noexcept { return facts_of[static_cas
 
 void CanDriver::note(Anomaly anomaly) noexcept {
   if (anomaly == Anomaly::none) return;
-  if (const auto counter = facts(anomaly).count; counter != nullptr) ++(counters_.*counter);
+  ++counters_.anomalies[static_cast<std::size_t>(anomaly)];
   worst_ = std::max(worst_, anomaly);
   // A late answer has already been counted as lost.
   if (anomaly != Anomaly::stale) bucket_.lost();
@@ -60,12 +58,11 @@ IoResult CanDriver::send_sync(std::int64_t now_ns) noexcept {
   worst_ = Anomaly::none;
   worst_id_ = 0;
   if (lock_step_) {
-    if (const IoResult result = sent(link_.socket->send(frame_of(id::time, {.host_time_ns = now_ns})), id::time);
-        !result.ok())
-      return result;
+    const IoResult result = sent(link_.socket->send(frame_of(id::time, {.host_time_ns = now_ns})));
+    if (!result.ok()) return result;
   }
   sent_ns_ = monotonic_ns();
-  return sent(link_.socket->send(in_format(frame_of(id::sync, {.sequence = sync_}))), id::sync);
+  return sent(link_.socket->send(in_format(frame_of(id::sync, {.sequence = sync_}))));
 }
 
 IoResult CanDriver::take_error_frame(const Frame& frame) noexcept {
@@ -115,7 +112,7 @@ IoResult CanDriver::take(const Frame& frame) noexcept {
       take_message(decoded);
       received_ns_ = frame.received_ns;
       break;
-    case DecodeError::unknown_identifier: ++counters_.ignored; break;
+    case DecodeError::unknown_identifier: break;
     case DecodeError::wrong_length: note(Anomaly::wrong_length); break;
     case DecodeError::wrong_check: note(Anomaly::forged); break;
     case DecodeError::out_of_range: note(Anomaly::implausible); break;
@@ -132,14 +129,12 @@ IoResult CanDriver::collect() noexcept {
       note(Anomaly::too_many);
       return {};
     }
-    const ReceiveResult received = link_.socket->receive(frame, deadline_ns);
-    switch (received.outcome) {
-      case ReceiveOutcome::frame: break;
-      case ReceiveOutcome::nothing: return {};
-      case ReceiveOutcome::malformed: note(Anomaly::wrong_length); continue;
-      case ReceiveOutcome::down:
-        return {IoError::disconnected, id::latch, received.errno_value, rig::Reason::can_interface_down};
-      case ReceiveOutcome::failed: return {IoError::disconnected, id::latch, received.errno_value};
+    const IoResult received = link_.socket->receive(frame, deadline_ns);
+    if (received.error == IoError::disconnected) return received;
+    if (received.error == IoError::no_answer) return {};
+    if (received.error == IoError::incomplete_answer) {
+      note(Anomaly::wrong_length);
+      continue;
     }
     if (const IoResult result = take(frame); !result.ok()) return result;
   }

@@ -38,7 +38,7 @@ class CanSafeState final : public OwnHandleWriter<Link> {
   /// shows a node that is not inactive, or duties, or is a command.
   [[nodiscard]] IoResult look() noexcept override {
     IoResult seen{IoError::no_answer, id::sync};
-    if (handle_.socket->send(frame_of(id::sync, {.sequence = ++sync_})).outcome != SendOutcome::sent) return seen;
+    if (!handle_.socket->send(frame_of(id::sync, {.sequence = ++sync_})).ok()) return seen;
     handle_.socket->listen(monotonic_ns() + look_ns, [&](const Frame& frame) {
       const Decoded decoded = decode(frame);
       const Values& told = decoded.values;
@@ -52,11 +52,11 @@ class CanSafeState final : public OwnHandleWriter<Link> {
     return seen;
   }
   [[nodiscard]] IoResult send_zeros() noexcept {
-    const SendResult requested = handle_.socket->send(control_frame(Request::deactivate));
+    const IoResult requested = handle_.socket->send(control_frame(Request::deactivate));
     // A node that missed the request, or does not obey it, still takes a command of zeros.
-    const SendResult zeros = handle_.socket->send(frame_of(id::command, {}));
-    for (const SendResult& result : {requested, zeros}) {
-      if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
+    const IoResult zeros = handle_.socket->send(frame_of(id::command, {}));
+    for (const IoResult& result : {requested, zeros}) {
+      if (result.error == IoError::disconnected) {
         return {IoError::disconnected, id::control, result.errno_value, rig::Reason::can_interface_down};
       }
     }

@@ -62,7 +62,6 @@ void read_controller(InterfaceFacts& facts, const void* data, std::size_t size) 
       case IFLA_CAN_BITTIMING: facts.bit_rate = value_of<can_bittiming>(value, bytes).bitrate; break;
       case IFLA_CAN_DATA_BITTIMING: facts.data_bit_rate = value_of<can_bittiming>(value, bytes).bitrate; break;
       case IFLA_CAN_STATE: facts.state = state_name(value_of<std::uint32_t>(value, bytes)); break;
-      case IFLA_CAN_RESTART_MS: facts.restart_ms = value_of<std::uint32_t>(value, bytes); break;
       case IFLA_CAN_BERR_COUNTER: {
         const auto errors = value_of<can_berr_counter>(value, bytes);
         facts.transmit_errors = errors.txerr;
@@ -87,7 +86,6 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
     switch (type) {
       case IFLA_IFNAME: facts.name = text_of(value, bytes); break;
       case IFLA_MTU: facts.can_fd = value_of<std::uint32_t>(value, bytes) >= canfd_mtu; break;
-      case IFLA_TXQLEN: facts.queue_length = value_of<std::uint32_t>(value, bytes); break;
       case IFLA_LINKINFO: read_link_kind(facts, value, bytes); break;
       default: break;
     }
@@ -157,24 +155,24 @@ std::optional<InterfaceFacts> find_interface(const std::string& name) {
   return std::nullopt;
 }
 
-std::optional<InterfaceProblem> problem_of(const InterfaceFacts& facts) {
+std::optional<FoundBoard::Obstacle> problem_of(const InterfaceFacts& facts) {
   const std::string set_link = "sudo ip link set " + facts.name;
   const bool has_controller = !facts.state.empty();
   if (!facts.up) {
-    return InterfaceProblem{
+    return FoundBoard::Obstacle{
         "down", has_controller ? set_link + " type can bitrate 1000000 && " + set_link + " up" : set_link + " up"};
   }
   if (facts.state == "bus-off" || facts.state == "stopped") {
-    return InterfaceProblem{facts.state,
-                            "repair the wiring (docs/can.md), then " + set_link + " down && " + set_link + " up"};
+    return FoundBoard::Obstacle{facts.state,
+                                "repair the wiring (docs/can.md), then " + set_link + " down && " + set_link + " up"};
   }
   if (facts.state == "error-passive") {
-    return InterfaceProblem{
+    return FoundBoard::Obstacle{
         "error-passive",
         "no node acknowledges, or the bit rates differ: check the node, the wiring, the two 120 ohm "
         "terminations and the bit rate (docs/can.md)"};
   }
-  if (!facts.running) return InterfaceProblem{"without carrier", set_link + " down && " + set_link + " up"};
+  if (!facts.running) return FoundBoard::Obstacle{"without carrier", set_link + " down && " + set_link + " up"};
   return std::nullopt;
 }
 

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
 
@@ -132,15 +131,10 @@ sockaddr_in parse_address(const std::string& text) {
   const std::size_t colon = text.find(':');
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  std::uint16_t port = standard_port;
-  bool good = ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) == 1;
-  if (colon != std::string::npos) {
-    const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data() + colon + 1, end, port);
-    good = good && error == std::errc{} && rest == end && port != 0;
-  }
+  const auto port =
+      colon == std::string::npos ? standard_port : rig::parse_number<std::uint16_t>(text.substr(colon + 1)).value_or(0);
   address.sin_port = htons(port);
-  if (good) return address;
+  if (port != 0 && ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) == 1) return address;
   throw std::invalid_argument("driver.hm2.address = \"" + text +
                               "\": give an IPv4 address or address:port, such as 192.168.1.121:27181");
 }

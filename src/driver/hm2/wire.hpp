@@ -80,9 +80,6 @@ class Packet {
 /// Sends and receives datagrams.
 class Link {
  public:
-  Link() = default;
-  Link(const Link&) = delete;
-  Link& operator=(const Link&) = delete;
   virtual ~Link() = default;
   /// Returns 0 or the system's error. Does not wait. Real-time safe, like `receive`.
   virtual int send(std::span<const std::uint8_t> bytes) noexcept = 0;

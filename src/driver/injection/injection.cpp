@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <span>
 #include <stdexcept>
@@ -39,8 +38,9 @@ std::string listed(std::span<const std::string_view> names) {
 }
 
 bool is_number(std::string_view text, double& value) {
-  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && at == text.data() + text.size() && std::isfinite(value);
+  const auto number = rig::parse_number<double>(text);
+  value = number.value_or(value);
+  return number && std::isfinite(*number);
 }
 
 /// Parses "0.2s" or "200ms".

@@ -163,7 +163,7 @@ Obstacles obstacles_or_error(const fs::path& device) try {
 /// Without a lock: a run may have the card. No other register shows reliably that the card is absent.
 bool answers_all_ones(const std::string& file) try {
   std::uint32_t version = 0;
-  return SysfsWindow(file, WindowUse::beside_guardian).read32(reg::bitstream_version, version).ok() &&
+  return open_window(file, WindowUse::beside_guardian)->read32(reg::bitstream_version, version).ok() &&
          version == all_ones;
 } catch (const Unavailable&) {
   return false;
@@ -222,10 +222,8 @@ Card open_card(const PciOptions& options, bool lock_step) {
   refuse_obstacles(folder, card_obstacles(folder));
   std::error_code ignored;
   require_lock_step("the card in " + folder.string(), lock_step, fs::exists(folder / emulated_time_file, ignored));
-  Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"),
-            .place = bdf + " in " + options.root,
-            .address = bdf};
-  if (lock_step) card.time = std::make_unique<EmulatedTimeFile>(folder / emulated_time_file);
+  Card card{.window = open_window(folder / "resource2"), .place = bdf + " in " + options.root, .address = bdf};
+  if (lock_step) card.time = open_emulated_time(folder / emulated_time_file);
   return card;
 }
 
@@ -234,8 +232,7 @@ std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, boo
   if (file != nullptr) *file = (folder / "resource2").string();
   check_bar2(folder);
   refuse_obstacles(folder, port_obstacles(folder));
-  return std::make_unique<SysfsWindow>(folder / "resource2",
-                                       beside_guardian ? WindowUse::beside_guardian : WindowUse::guardian);
+  return open_window(folder / "resource2", beside_guardian ? WindowUse::beside_guardian : WindowUse::guardian);
 }
 
 }  // namespace abs_hil::driver::pci

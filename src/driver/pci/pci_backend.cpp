@@ -75,7 +75,7 @@ constexpr std::array table{
 std::unique_ptr<RigDriver> make_pci_driver(const PciOptions& options, const RunFacts& run) {
   PciOptions pci = options;
   pci.encoder_counts_per_rev = run.encoder_counts_per_rev;
-  return std::make_unique<PciDriver>(
+  return pci_driver(
       pci, [pci, lock_step = run.lock_step] { return open_card(pci, lock_step); },
       run.lock_step ? nullptr : monotonic_ns);
 }
@@ -134,31 +134,13 @@ Backend pci_backend() {
   });
 }
 
-std::vector<std::string> PciDriver::notes() const {
-  if (!card_.window) return {};
-  const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
-  std::vector<std::string> notes;
-  notes.push_back("card " + card_.place + ": BAR 2, I/O ports, opened and locked");
-  notes.push_back(
-      formatted("bitstream version 0x%04x (%s), channel counts 0x%04x: %u counters, %u timers", version_ & low_16_bits,
-                options_.bitstream >= 0 ? "as configured" : "not compared: driver.pci.bitstream is not set",
-                channel_counts_ & low_16_bits, (channel_counts_ >> 12U) & 0xFU, (channel_counts_ >> 8U) & 0xFU));
-  notes.push_back(formatted("PWM %s, prescaler %u: %.4g Hz; drive duty at most %.3g, brake duty at most %.3g",
-                            options_.pwm_mode.c_str(), prescaler, pwm_frequency_Hz(mode_, prescaler),
-                            options_.motor_duty_max, options_.brake_duty_max));
-  notes.push_back(formatted("%zu register accesses a cycle (%zu reading, %zu writing), about 1 us each on PCI",
-                            accesses_per_cycle, accesses_in_read, accesses_in_write));
-  return notes;
-}
-
-std::vector<std::string> PciDriver::inspection() {
-  if (!card_.window) return {};
+std::vector<std::string> shown_registers(RegisterWindow& window) {
   std::uint32_t period_ticks = 0;
-  static_cast<void>(card_.window->read32(reg::velocity_period, period_ticks));  // 0 makes the velocities NaN
+  static_cast<void>(window.read32(reg::velocity_period, period_ticks));  // 0 makes the velocities NaN
   std::vector<std::string> lines;
   for (const Register& entry : registers()) {
     std::uint32_t raw = 0;
-    const IoResult result = card_.window->read32(entry.offset, raw);
+    const IoResult result = window.read32(entry.offset, raw);
     std::string line = formatted("%02X  %-34s", entry.offset, std::string(entry.name).c_str());
     line += result.ok() ? formatted("0x%08x  %-12s", raw, converted(entry.offset, raw, period_ticks).c_str())
                         : formatted("%-24s", error_text(result).c_str());
@@ -169,7 +151,7 @@ std::vector<std::string> PciDriver::inspection() {
   }
   std::uint32_t high = 0;
   std::uint32_t low = 0;
-  if (card_.window->read32(reg::temperature_high, high).ok() && card_.window->read32(reg::temperature_low, low).ok()) {
+  if (window.read32(reg::temperature_high, high).ok() && window.read32(reg::temperature_low, low).ok()) {
     lines.push_back(formatted("    temperature %.1f deg C", temperature_C(high, low)));
   }
   return lines;

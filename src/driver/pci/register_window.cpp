@@ -124,6 +124,48 @@ IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept
   return {IoError::no_answer, where, EINTR};
 }
 
+class SysfsWindow final : public RegisterWindow {
+ public:
+  explicit SysfsWindow(const std::filesystem::path& resource_file, WindowUse use = WindowUse::owner)
+      : file_(open_for_access(resource_file)) {
+    if (use == WindowUse::guardian) become_guardian(resource_file, file_.get());
+    if (use == WindowUse::owner) become_owner(resource_file, file_.get());
+  }
+
+  IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override {
+    std::uint32_t word = 0;
+    const IoResult result = whole_access(
+        offset, sizeof word, [&] { return ::pread(file_.get(), &word, sizeof word, static_cast<off_t>(offset)); });
+    if (result.ok()) value = word;
+    return result;
+  }
+  IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept override {
+    return whole_access(offset, sizeof value,
+                        [&] { return ::pwrite(file_.get(), &value, sizeof value, static_cast<off_t>(offset)); });
+  }
+  void refuse_owners(bool refuse) noexcept override {
+    static_cast<void>(set_guardian_lock(file_.get(), refuse ? F_WRLCK : F_UNLCK));
+  }
+
+ private:
+  FileDescriptor file_;
+};
+
+class EmulatedTimeFile final : public EmulatedTime {
+ public:
+  explicit EmulatedTimeFile(const std::filesystem::path& file) : file_(open_for_access(file)) {}
+
+  IoResult now(std::int64_t& time_ns) noexcept override {
+    return whole_access(0, sizeof time_ns, [&] { return ::pread(file_.get(), &time_ns, sizeof time_ns, 0); });
+  }
+  IoResult advance_to(std::int64_t time_ns) noexcept override {
+    return whole_access(0, sizeof time_ns, [&] { return ::pwrite(file_.get(), &time_ns, sizeof time_ns, 0); });
+  }
+
+ private:
+  FileDescriptor file_;
+};
+
 }  // namespace
 
 IoError io_error_for(int errno_value) noexcept {
@@ -139,37 +181,12 @@ IoError io_error_for(int errno_value) noexcept {
   }
 }
 
-SysfsWindow::SysfsWindow(const std::filesystem::path& resource_file, WindowUse use)
-    : file_(open_for_access(resource_file)) {
-  if (use == WindowUse::guardian) become_guardian(resource_file, file_.get());
-  if (use == WindowUse::owner) become_owner(resource_file, file_.get());
+std::unique_ptr<RegisterWindow> open_window(const std::filesystem::path& resource_file, WindowUse use) {
+  return std::make_unique<SysfsWindow>(resource_file, use);
 }
 
-IoResult SysfsWindow::read32(std::uint32_t offset, std::uint32_t& value) noexcept {
-  std::uint32_t word = 0;
-  const IoResult result = whole_access(
-      offset, sizeof word, [&] { return ::pread(file_.get(), &word, sizeof word, static_cast<off_t>(offset)); });
-  if (result.ok()) value = word;
-  return result;
-}
-
-IoResult SysfsWindow::write32(std::uint32_t offset, std::uint32_t value) noexcept {
-  return whole_access(offset, sizeof value,
-                      [&] { return ::pwrite(file_.get(), &value, sizeof value, static_cast<off_t>(offset)); });
-}
-
-void SysfsWindow::refuse_owners(bool refuse) noexcept {
-  static_cast<void>(set_guardian_lock(file_.get(), refuse ? F_WRLCK : F_UNLCK));
-}
-
-EmulatedTimeFile::EmulatedTimeFile(const std::filesystem::path& file) : file_(open_for_access(file)) {}
-
-IoResult EmulatedTimeFile::now(std::int64_t& time_ns) noexcept {
-  return whole_access(0, sizeof time_ns, [&] { return ::pread(file_.get(), &time_ns, sizeof time_ns, 0); });
-}
-
-IoResult EmulatedTimeFile::advance_to(std::int64_t time_ns) noexcept {
-  return whole_access(0, sizeof time_ns, [&] { return ::pwrite(file_.get(), &time_ns, sizeof time_ns, 0); });
+std::unique_ptr<EmulatedTime> open_emulated_time(const std::filesystem::path& file) {
+  return std::make_unique<EmulatedTimeFile>(file);
 }
 
 }  // namespace abs_hil::driver::pci

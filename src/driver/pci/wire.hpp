@@ -103,9 +103,6 @@ enum class Pwm : std::uint32_t { drive = 0, brake = 1 };
 /// or lock; each access takes as long as the bus.
 class RegisterWindow {
  public:
-  RegisterWindow() = default;
-  RegisterWindow(const RegisterWindow&) = delete;
-  RegisterWindow& operator=(const RegisterWindow&) = delete;
   virtual ~RegisterWindow() = default;
 
   /// `value` does not change on error. `IoResult::where` is the offset.
@@ -121,33 +118,15 @@ enum class WindowUse : std::uint8_t { owner, guardian, beside_guardian };
 
 /// The registers behind sysfs' `resource2`. For an I/O BAR the kernel turns a 4-byte pread or pwrite at the register's
 /// offset into one 32-bit port access (Documentation/PCI/sysfs-pci.rst). Only one process may own a card, because index
-/// and data are two accesses. The file stays locked (flock) during this object's lifetime.
-class SysfsWindow final : public RegisterWindow {
- public:
-  /// Opens and locks the file. Throws Unavailable if the file is missing, if access is not permitted (with the udev
-  /// rule that fixes it), or if another process owns the card or still makes it safe (with its id).
-  explicit SysfsWindow(const std::filesystem::path& resource_file, WindowUse use = WindowUse::owner);
-
-  IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override;
-  IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept override;
-  void refuse_owners(bool refuse) noexcept override;
-
- private:
-  FileDescriptor file_;
-};
+/// and data are two accesses. The file stays locked (flock) during the window's lifetime.
+/// Throws Unavailable if the file is missing, if access is not permitted (with the udev rule that fixes it), or if
+/// another process owns the card or still makes it safe (with its id).
+[[nodiscard]] std::unique_ptr<RegisterWindow> open_window(const std::filesystem::path& resource_file,
+                                                          WindowUse use = WindowUse::owner);
 
 /// The emulator's clock: a file of 8 bytes in the card's folder, the time in ns. A write advances the time.
-class EmulatedTimeFile final : public EmulatedTime {
- public:
-  /// Throws Unavailable if the file is missing or cannot be opened.
-  explicit EmulatedTimeFile(const std::filesystem::path& file);
-
-  IoResult now(std::int64_t& time_ns) noexcept override;
-  IoResult advance_to(std::int64_t time_ns) noexcept override;
-
- private:
-  FileDescriptor file_;
-};
+/// Throws Unavailable if the file is missing or cannot be opened.
+[[nodiscard]] std::unique_ptr<EmulatedTime> open_emulated_time(const std::filesystem::path& file);
 
 /// The error that an errno of pread or pwrite means.
 [[nodiscard]] IoError io_error_for(int errno_value) noexcept;

@@ -131,7 +131,7 @@ std::optional<InterfaceSetting> find_interface(std::span<const std::uint8_t> des
       active = one[configuration_value] == configuration;
       setting.reset();
     } else if (type == USB_DT_INTERFACE && length >= USB_DT_INTERFACE_SIZE && active) {
-      setting = {.interface = one[interface_number], .alternate = one[interface_alternate]};
+      setting = {.number = one[interface_number], .alternate = one[interface_alternate]};
       found = 0;
     } else if (type == USB_DT_ENDPOINT && length >= USB_DT_ENDPOINT_SIZE && setting) {
       found |= which(one);

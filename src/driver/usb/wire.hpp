@@ -3,8 +3,6 @@
 
 #pragma once
 
-#include <linux/usbdevice_fs.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -175,9 +173,7 @@ inline constexpr const char* lock_step_mark = "emulator in lock-step";
 
 /// An interface, and the alternate setting of it.
 struct InterfaceSetting {
-  std::uint8_t interface {
-    0
-  };
+  std::uint8_t number{0};
   std::uint8_t alternate{0};
 };
 
@@ -193,9 +189,6 @@ struct InterfaceSetting {
 /// before its request. As real-time safe as the system below it.
 class FrameLink {
  public:
-  FrameLink() = default;
-  FrameLink(const FrameLink&) = delete;
-  FrameLink& operator=(const FrameLink&) = delete;
   virtual ~FrameLink() = default;
 
   /// Queues a frame for the board. `no_answer`: not queued, because the board has not taken the previous ones for too
@@ -242,9 +235,6 @@ inline constexpr std::uint8_t endpoint_in = 0x84;
 /// result is -errno. As real-time safe as the kernel below it.
 class Usbfs {
  public:
-  Usbfs() = default;
-  Usbfs(const Usbfs&) = delete;
-  Usbfs& operator=(const Usbfs&) = delete;
   virtual ~Usbfs() = default;
 
   /// Opens the node for reading and writing; returns its file descriptor.
@@ -264,78 +254,16 @@ class Usbfs {
 /// The kernel itself. Its calls allocate nothing and take no lock in this process.
 [[nodiscard]] Usbfs& kernel_usbfs() noexcept;
 
-/// Frames as USB request blocks (URBs), which ioctls on the device's node give to the kernel and take back. The
-/// constructor allocates all URBs and buffers. Every other function allocates nothing and takes no lock in this
+/// Frames as USB request blocks (URBs), which ioctls on the device's node give to the kernel and take back. All
+/// URBs and buffers are allocated here. The functions of the link allocate nothing and take no lock in this
 /// process. Its system calls are one ioctl per submission and two at most per completion, and the wait of `receive`
 /// (docs/usb.md).
-class UrbLink final : public FrameLink {
- public:
-  /// Opens the device and claims the interface with the FPGA's two endpoints. Throws Unavailable if access is not
-  /// permitted (with the udev rule that fixes it), if the device is in use, or if it lacks these endpoints.
-  /// @param usbfs must outlive the link
-  explicit UrbLink(const UsbDevice& device, Usbfs& usbfs = kernel_usbfs());
-  /// Gives everything back to the kernel, which cancels what is under way.
-  ~UrbLink() override = default;
-
-  IoResult send(const Frame& frame) noexcept override;
-  IoResult request() noexcept override;
-  [[nodiscard]] bool answer_outstanding() const noexcept override;
-  IoResult receive(std::int64_t timeout_ns, std::span<const std::uint8_t>& bytes) noexcept override;
-  IoResult flush(std::int64_t timeout_ns) noexcept override;
-  void recover() noexcept override;
-
-  /// Control requests of the emulator in lock-step, never sent to hardware.
-  IoResult emulated_time(std::int64_t& time_ns) noexcept;
-  IoResult advance_emulated_time(std::int64_t time_ns) noexcept;
-
- private:
-  /// The open node; closes itself.
-  class Node {
-   public:
-    Node(const UsbDevice& device, Usbfs& usbfs);
-    Node(const Node&) = delete;
-    Node& operator=(const Node&) = delete;
-    ~Node() { usbfs_.close(file_); }
-    int ioctl(unsigned long request, void* argument) noexcept { return usbfs_.ioctl(file_, request, argument); }
-    [[nodiscard]] std::vector<std::uint8_t> descriptors(const UsbDevice& device);
-    void wait(std::int64_t timeout_ns) noexcept { usbfs_.wait(file_, timeout_ns); }
-    std::int64_t now_ns() noexcept { return usbfs_.now_ns(); }
-
-   private:
-    Usbfs& usbfs_;
-    int file_;
-  };
-  /// The size of a full packet, so that an answer that is too long is not reported as an overflow.
-  static constexpr std::size_t packet_bytes = 512;
-  /// One URB and its buffer. While it is under way the kernel owns both.
-  struct Slot {
-    std::unique_ptr<usbdevfs_urb> urb{};
-    std::array<std::uint8_t, packet_bytes> buffer{};
-    bool under_way{false};
-    int status{0};  ///< of the last transfer: 0, or -errno until a call has returned it
-    std::size_t length{0};
-  };
-  static constexpr std::size_t frame_slots = 3;
-
-  void claim(const UsbDevice& device);
-  IoResult submit(Slot& slot, std::size_t bytes) noexcept;
-  /// Takes back from the kernel what has ended.
-  void reap() noexcept;
-  /// Reaps until the slot is free or the time has passed.
-  void wait_for(const Slot& slot, std::int64_t deadline_ns) noexcept;
-  /// The first failed send that no call has returned yet.
-  IoResult take_send_failure() noexcept;
-  void cancel(Slot& slot) noexcept;
-  void cancel_all() noexcept;
-  IoResult control(std::uint8_t direction, std::int64_t& time_ns) noexcept;
-
-  std::array<Slot, frame_slots> frames_{};
-  std::size_t next_frame_{0};
-  Slot request_{};
-  Slot answer_{};
-  std::array<Slot*, frame_slots + 2> all_{&frames_[0], &frames_[1], &frames_[2], &request_, &answer_};
-  Node node_;  ///< last, so that the kernel gives the URBs up before they are freed
-};
+///
+/// Opens the device and claims the interface with the FPGA's two endpoints. Throws Unavailable if access is not
+/// permitted (with the udev rule that fixes it), if the device is in use, or if it lacks these endpoints. The end of
+/// the link gives everything back to the kernel, which cancels what is under way.
+/// @param usbfs must outlive the link
+[[nodiscard]] std::unique_ptr<FrameLink> urb_link(const UsbDevice& device, Usbfs& usbfs = kernel_usbfs());
 
 /// Opens the board that the options select (`choose_board`). Throws Unavailable.
 /// @param usbfs must outlive the board

@@ -8,6 +8,7 @@
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;
+using driver::can::Anomaly;
 using driver::can::CanDriver;
 using driver::can::CanOptions;
 using test::NodeOnSocket;
@@ -214,7 +215,7 @@ TEST_CASE("The tally is one line after a good run, and lists the anomalies of an
   while (odd.cycle().ok()) {
   }
   const std::string told = joined(odd.driver.tally());
-  const std::uint64_t wrong = odd.driver.counters().wrong_length;
+  const std::uint64_t wrong = odd.driver.counters().of(Anomaly::wrong_length);
   CHECK(wrong > 0);
   CHECK_THAT(told, Contains(std::to_string(wrong) + " of wrong length"));
   CHECK_THAT(told, Contains("0 stale, 0 duplicate, 0 out of order") && Contains("0 times the send queue was full"));

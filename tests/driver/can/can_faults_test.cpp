@@ -7,6 +7,7 @@
 #include "node_on_socket.hpp"
 
 using namespace abs_hil;
+using driver::can::Anomaly;
 using driver::can::CanDriver;
 using driver::can::CanOptions;
 using rig::Reason;
@@ -120,7 +121,7 @@ TEST_CASE("Single losses are tolerated: the previous measurement is returned aga
   }
   for (int i = 0; i < 20; ++i) REQUIRE(rig.cycle().ok());
   CHECK(rig.measurement.time_ns == rig.now_ns);
-  CHECK(rig.driver.counters().lost == 4);
+  CHECK(rig.driver.counters().of(Anomaly::missing) == 4);
   CHECK(rig.node.wire().brake_duty == 0.5);
 }
 
@@ -189,7 +190,7 @@ TEST_CASE("Forged, repeated and old commands have no effect and do not feed the 
   Active rig;
   emulator::BusFrame forged{.id = 0x81, .length = 8, .data = {0x10, 0x27}};
   emulator::BusFrame old = forged;  // its check is right, its sequence was used before
-  emulator::seal(old);
+  old.seal();
   const std::int64_t commanded_ns = rig.now_ns;
   while (rig.now_ns - commanded_ns < 20 * ms) {
     CHECK(rig.node.wire().brake_duty == 0.5);

@@ -79,7 +79,7 @@ class NodeOnSocket {
   class PromptSocket final : public driver::can::FrameSocket {
    public:
     PromptSocket(int descriptor, NodeOnSocket& node) : FrameSocket(descriptor), node_(node) {}
-    driver::can::ReceiveResult receive(driver::can::Frame& frame, std::int64_t /*deadline_ns*/) noexcept override {
+    driver::IoResult receive(driver::can::Frame& frame, std::int64_t /*deadline_ns*/) noexcept override {
       node_.with_node([](emulator::CanNode&, emulator::NodeFaults&) {});
       return FrameSocket::receive(frame, 0);
     }

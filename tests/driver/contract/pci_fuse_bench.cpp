@@ -29,7 +29,7 @@ class PciFuseBench final : public Bench {
     std::string pattern = (fs::temp_directory_path() / "abs_hil_contract.XXXXXX").string();
     folder_ = ::mkdtemp(pattern.data());
     start();
-    options_.of<driver::pci::PciOptions>().root = (folder_ / "pci").string();
+    options_.boards.of<driver::pci::PciOptions>().root = (folder_ / "pci").string();
     driver_ = driver::make_rig_driver(options_, true);
   }
   ~PciFuseBench() override {

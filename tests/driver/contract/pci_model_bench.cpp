@@ -33,8 +33,7 @@ class PciModelBench final : public Bench {
 
  private:
   ModelCard card_{{.start_speed_rad_s = bench_speed_rad_s}};
-  std::unique_ptr<driver::pci::PciDriver> driver_ =
-      std::make_unique<driver::pci::PciDriver>(driver::pci::PciOptions{}, card_.opener());
+  std::unique_ptr<driver::RigDriver> driver_ = driver::pci::pci_driver({}, card_.opener());
 };
 
 }  // namespace

@@ -30,8 +30,7 @@ class UsbModelBench final : public Bench {
 
  private:
   ModelBoard board_{{.start_speed_rad_s = bench_speed_rad_s}};
-  std::unique_ptr<driver::usb::UsbDriver> driver_ =
-      std::make_unique<driver::usb::UsbDriver>(driver::usb::UsbOptions{}, board_.opener());
+  std::unique_ptr<driver::RigDriver> driver_ = driver::usb::usb_driver({}, board_.opener());
 };
 
 }  // namespace

@@ -25,7 +25,7 @@ struct ModelCard {
   explicit ModelCard(const emulator::CardOptions& options = {}) : model(options), faulty(model, 1) {}
 
   /// Opens the card for the driver; the model must outlive it.
-  [[nodiscard]] driver::pci::PciDriver::OpenCard opener();
+  [[nodiscard]] driver::pci::OpenCard opener();
   /// The accesses since the last call.
   std::vector<RegisterAccess> take_traffic() { return std::exchange(traffic, {}); }
 
@@ -81,7 +81,7 @@ class ModelTime final : public driver::EmulatedTime {
   ModelCard& card_;
 };
 
-inline driver::pci::PciDriver::OpenCard ModelCard::opener() {
+inline driver::pci::OpenCard ModelCard::opener() {
   return [this] {
     driver::pci::Card card{.place = "0000:03:00.0 in this process"};
     card.window = std::make_unique<ModelWindow>(*this);

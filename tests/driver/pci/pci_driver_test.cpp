@@ -10,7 +10,6 @@
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
-using pci::PciDriver;
 using pci::PciOptions;
 using test::ModelCard;
 using test::RegisterAccess;
@@ -32,7 +31,8 @@ RegisterAccess R(std::uint32_t offset, std::uint32_t value) { return {false, off
 
 TEST_CASE("Configuring reads and writes nothing") {
   ModelCard card;
-  PciDriver driver({}, card.opener());
+  const auto own_driver = pci::pci_driver({}, card.opener());
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   for (const RegisterAccess& access : card.take_traffic()) CHECK_FALSE(access.is_write);
   CHECK(driver.notes().size() == 4);
@@ -45,7 +45,8 @@ TEST_CASE("Activation takes the outputs over: width 0 first, mode and prescaler 
   card.model.write32(0x60, 1);  // as somebody else left it
   card.model.write32(0x6C, 3000);
   card.model.write32(0x84, 7);
-  PciDriver driver({}, card.opener());
+  const auto own_driver = pci::pci_driver({}, card.opener());
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   card.take_traffic();
   driver.activate(0);
@@ -61,7 +62,8 @@ TEST_CASE("Activation takes the outputs over: width 0 first, mode and prescaler 
 
 TEST_CASE("A cycle has exactly twelve accesses, with the health registers and the settings in turn") {
   ModelCard card;
-  PciDriver driver({}, card.opener());
+  const auto own_driver = pci::pci_driver({}, card.opener());
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   driver.activate(0);
   card.take_traffic();
@@ -83,7 +85,8 @@ TEST_CASE("The brake is capped at 0.7 unless configured, the drive as configured
   ModelCard card;
   PciOptions options;
   SECTION("as delivered") {
-    PciDriver driver(options, card.opener());
+    const auto own_driver = pci::pci_driver(options, card.opener());
+    driver::RigDriver& driver = *own_driver;
     driver.configure();
     driver.activate(0);
     REQUIRE(driver.write({.motor_duty = 1.0, .brake_duty = 1.0, .motor_enable = true}).ok());
@@ -93,7 +96,8 @@ TEST_CASE("The brake is capped at 0.7 unless configured, the drive as configured
   SECTION("configured") {
     options.brake_duty_max = 1.0;
     options.motor_duty_max = 0.25;
-    PciDriver driver(options, card.opener());
+    const auto own_driver = pci::pci_driver(options, card.opener());
+    driver::RigDriver& driver = *own_driver;
     driver.configure();
     driver.activate(0);
     REQUIRE(driver.write({.motor_duty = 1.0, .brake_duty = 1.0, .motor_enable = true}).ok());
@@ -103,7 +107,8 @@ TEST_CASE("The brake is capped at 0.7 unless configured, the drive as configured
   SECTION("8-bit mode") {
     options.pwm_mode = "8-bit";
     options.pwm_prescaler = 44;
-    PciDriver driver(options, card.opener());
+    const auto own_driver = pci::pci_driver(options, card.opener());
+    driver::RigDriver& driver = *own_driver;
     driver.configure();
     driver.activate(0);
     REQUIRE(driver.write({.motor_duty = 0.5, .motor_enable = true}).ok());
@@ -118,7 +123,8 @@ TEST_CASE("Channels and signs of the encoders are those configured") {
   options.lower_channel = 1;
   options.upper_channel = 0;
   options.upper_sign = -1;
-  PciDriver driver(options, card.opener());
+  const auto own_driver = pci::pci_driver(options, card.opener());
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   driver.activate(0);
   card.model.turn_by_hand(true, 0.05);    // the model's upper wheel is on channel 1
@@ -134,7 +140,8 @@ TEST_CASE("Counters wrap around at 32 bit, with either sign") {
     ModelCard card;
     PciOptions options;
     options.upper_sign = sign;
-    PciDriver driver(options, card.opener());
+    const auto own_driver = pci::pci_driver(options, card.opener());
+    driver::RigDriver& driver = *own_driver;
     driver.configure();
     driver.activate(0);
     // The register 50 counts before and after the wrap, seen through a register that reads too much.
@@ -161,7 +168,8 @@ TEST_CASE("A reading has the time stamp of its middle; a delayed one is repeated
   step_ns = 40'000;
   const auto clock = []() noexcept { return clock_ns += step_ns; };
   ModelCard card;
-  PciDriver driver({}, card.opener(), clock);
+  const auto own_driver = pci::pci_driver({}, card.opener(), clock);
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   driver.activate(0);
   card.take_traffic();
@@ -181,8 +189,8 @@ TEST_CASE("Options outside their range are named") {
   ModelCard card;
   PciOptions options;
   options.upper_sign = 0;
-  CHECK_THROWS_WITH(PciDriver(options, card.opener()), Catch::Matchers::Contains("driver.pci.upper_sign = 0"));
+  CHECK_THROWS_WITH(pci::pci_driver(options, card.opener()), Catch::Matchers::Contains("driver.pci.upper_sign = 0"));
   options.upper_sign = 1;
   options.upper_channel = options.lower_channel;
-  CHECK_THROWS_WITH(PciDriver(options, card.opener()), Catch::Matchers::Contains("driver.pci.lower_channel"));
+  CHECK_THROWS_WITH(pci::pci_driver(options, card.opener()), Catch::Matchers::Contains("driver.pci.lower_channel"));
 }

@@ -10,7 +10,6 @@
 using namespace abs_hil;
 using namespace abs_hil::driver;
 using Catch::Matchers::Contains;
-using pci::PciDriver;
 using test::ModelCard;
 
 namespace {
@@ -18,7 +17,7 @@ namespace {
 constexpr std::int64_t ms = 1'000'000;
 constexpr rig::Command drive{.motor_duty = 0.5, .motor_enable = true};
 
-std::string configure_refusal(PciDriver& driver) {
+std::string configure_refusal(RigDriver& driver) {
   try {
     driver.configure();
   } catch (const Unavailable& error) {
@@ -28,7 +27,8 @@ std::string configure_refusal(PciDriver& driver) {
 }
 
 struct Running {
-  explicit Running(const emulator::CardOptions& options = {}) : card(options), driver({}, card.opener()) {
+  explicit Running(const emulator::CardOptions& options = {})
+      : card(options), own(pci::pci_driver({}, card.opener())), driver(*own) {
     driver.configure();
     driver.activate(0);
     REQUIRE(driver.read(0, measurement).ok());
@@ -38,7 +38,8 @@ struct Running {
   IoResult read_after(std::int64_t now_ns) { return driver.read(now_ns, measurement); }
 
   ModelCard card;
-  PciDriver driver;
+  std::unique_ptr<RigDriver> own;
+  RigDriver& driver;
   rig::Measurement measurement{};
 };
 
@@ -48,14 +49,16 @@ TEST_CASE("All ones and another bitstream are refused before anything is written
   ModelCard card;
   pci::PciOptions options;
   options.bitstream = 0xAB5;
-  PciDriver driver(options, card.opener());
+  const auto own_driver = pci::pci_driver(options, card.opener());
+  driver::RigDriver& driver = *own_driver;
   CHECK(configure_refusal(driver) == "configured");
   card.faulty.answer_all_ones(true);
   CHECK_THAT(configure_refusal(driver), Contains("answers all ones") && Contains("nothing was written"));
   CHECK(driver.state() == DriverState::unconfigured);
   card.faulty.answer_all_ones(false);
   options.bitstream = 0xAB6;
-  PciDriver other(options, card.opener());
+  const auto own_other = pci::pci_driver(options, card.opener());
+  driver::RigDriver& other = *own_other;
   CHECK_THAT(configure_refusal(other), Contains("bitstream version 2741 is not the configured 2742"));
   for (const auto& access : card.traffic) CHECK_FALSE(access.is_write);
 }
@@ -124,7 +127,8 @@ TEST_CASE("Taking over fails, with the register, if mode or counter do not take 
   const auto [fault, words] =
       GENERATE(std::pair("64:wrong=1", "0x64"), std::pair("88:wrong=1000000", "0x84"), std::pair("6c:off", "0x6c"));
   ModelCard card;
-  PciDriver driver({}, card.opener());
+  const auto own_driver = pci::pci_driver({}, card.opener());
+  driver::RigDriver& driver = *own_driver;
   driver.configure();
   card.faulty.set(fault);
   CHECK_THROWS_WITH(driver.activate(0), Contains("taking over the outputs failed") && Contains(words));

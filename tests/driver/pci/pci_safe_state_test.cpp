@@ -49,9 +49,10 @@ TEST_CASE("both PWMs are 0 whichever access of its cycle the owner was killed in
         ModelCard card;
         int left = 1'000'000;
         {
-          pci::PciDriver owner({}, [&card, &left] {
+          const auto own_owner = pci::pci_driver({}, [&card, &left] {
             return pci::Card{.window = std::make_unique<StoppedWindow>(card, left), .place = "test"};
           });
+          RigDriver& owner = *own_owner;
           owner.configure();
           owner.activate(0);
           rig::Measurement measurement;
@@ -141,7 +142,8 @@ TEST_CASE("Bits above the documented 16 of the PWM registers mean nothing, to th
     CAPTURE(fault);
     ModelCard card;
     card.faulty.set(fault);
-    pci::PciDriver owner({}, card.opener());
+    const auto own_owner = pci::pci_driver({}, card.opener());
+    driver::RigDriver& owner = *own_owner;
     owner.configure();
     owner.activate(0);
     rig::Command sent;

@@ -22,7 +22,7 @@ const Settings ours_is_setting_3{{.number = 0, .endpoints = {{0x06}, {0x88}}},
 TEST_CASE("The interface and the setting with both endpoints are found, in any order of these") {
   const auto found = find_interface(bytes_of(1, ours_is_setting_3), 1);
   REQUIRE(found);
-  CHECK(found->interface == 1);
+  CHECK(found->number == 1);
   CHECK(found->alternate == 3);
 }
 

@@ -40,7 +40,8 @@ struct UrbBench {
 
 /// A link, and a frame's whole way with it.
 struct OpenUrbBench : UrbBench {
-  UrbLink link{device(), usb};
+  std::unique_ptr<FrameLink> own{urb_link(device(), usb)};
+  FrameLink& link{*own};
 };
 
 inline Frame frame_of(std::uint8_t value) {
@@ -51,7 +52,7 @@ inline Frame frame_of(std::uint8_t value) {
 
 inline std::vector<std::uint8_t> bytes_of(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
 
-inline IoResult received(UrbLink& link, std::vector<std::uint8_t>& bytes, std::int64_t timeout_ns = 0) {
+inline IoResult received(FrameLink& link, std::vector<std::uint8_t>& bytes, std::int64_t timeout_ns = 0) {
   std::span<const std::uint8_t> view;
   const IoResult result = link.receive(timeout_ns, view);
   bytes = bytes_of(view);

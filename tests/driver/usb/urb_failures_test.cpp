@@ -43,7 +43,7 @@ TEST_CASE("A transfer that the kernel refuses has its error at once, and its slo
 TEST_CASE("A board that is unplugged ends every wait, whether or not the kernel has ended the transfers yet") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   const bool transfers_end = GENERATE(true, false);
   usb.takes = GENERATE(true, false);
   usb.waiting = [&](std::int64_t /*timeout_ns*/) {
@@ -68,7 +68,7 @@ TEST_CASE("A board that is unplugged ends every wait, whether or not the kernel 
 TEST_CASE("Recovery cancels queued transfers, clears both stalls and drops the board's old answers") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   usb.takes = false;
   CHECK(link.send(frame_of(1)).ok());
   CHECK(link.request().ok());
@@ -99,7 +99,7 @@ TEST_CASE("Recovery cancels queued transfers, clears both stalls and drops the b
 TEST_CASE("Recovery gives up on transfers that the kernel does not cancel") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   usb.takes = false;
   for (int i = 0; i < 3; ++i) CHECK(link.send(frame_of(1)).ok());
   CHECK(link.request().ok());

@@ -20,7 +20,7 @@ using driver::Unavailable;
 TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and everything is released") {
   UrbBench bench;
   {
-    const UrbLink link(bench.device(), bench.usb);
+    const auto link = urb_link(bench.device(), bench.usb);
     CHECK(bench.usb.claimed == std::vector{1U});
     CHECK(bench.usb.chosen_settings.empty());  // 0 is what it has already
   }
@@ -28,7 +28,7 @@ TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and every
   CHECK(bench.usb.open_files == 0);
 
   UrbBench other(3);
-  const UrbLink link(other.device(), other.usb);
+  const auto link = urb_link(other.device(), other.usb);
   CHECK(other.usb.chosen_settings == std::vector{3U});
 }
 
@@ -37,7 +37,7 @@ TEST_CASE("A device that cannot be opened is refused with its name and the cause
   auto& usb = bench.usb;
   const auto refusal = [&]() -> std::string {
     try {
-      const UrbLink link(bench.device(), usb);
+      const auto link = urb_link(bench.device(), usb);
     } catch (const Unavailable& error) {
       CHECK(usb.open_files == 0);
       CHECK(usb.claimed.empty());
@@ -92,7 +92,7 @@ TEST_CASE("A device that cannot be opened is refused with its name and the cause
 TEST_CASE("Frames reach the board in their order; one too many is refused, not queued") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   usb.takes = false;
   for (const std::uint8_t value : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}})
     CHECK(link.send(frame_of(value)).ok());
@@ -111,7 +111,7 @@ TEST_CASE("Frames reach the board in their order; one too many is refused, not q
 TEST_CASE("A request's answer arrives completely, with any length") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   std::vector<std::uint8_t> bytes;
   CHECK(link.request().ok());
   CHECK(link.answer_outstanding());
@@ -132,7 +132,7 @@ TEST_CASE("A request's answer arrives completely, with any length") {
 TEST_CASE("Waiting ends at its time, to the nanosecond, however often it is interrupted; an answer ends it at once") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   std::vector<std::uint8_t> bytes;
   const std::int64_t started_ns = usb.time_ns;
   CHECK(link.request().ok());
@@ -161,7 +161,7 @@ TEST_CASE("Waiting ends at its time, to the nanosecond, however often it is inte
 TEST_CASE("A cycle makes three submissions, at most two reaps for each, and two waits") {
   OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
+  FrameLink& link = bench.link;
   usb.takes = false;
   // The board takes the frame and the request, then answers.
   usb.waiting = [&usb](std::int64_t /*timeout_ns*/) {
@@ -196,7 +196,7 @@ TEST_CASE("The next call returns the result of a frame, once") {
     INFO("status " << c.status);
     OpenUrbBench bench;
     UsbfsStandIn& usb = bench.usb;
-    UrbLink& link = bench.link;
+    FrameLink& link = bench.link;
     usb.out_status = c.status;
     CHECK(link.send(frame_of(1)).ok());
     const IoResult told = link.send(frame_of(2));

@@ -11,7 +11,6 @@ using namespace abs_hil;
 using namespace abs_hil::driver;
 using Catch::Matchers::Contains;
 using test::ModelBoard;
-using usb::UsbDriver;
 using usb::UsbOptions;
 
 namespace {
@@ -20,7 +19,7 @@ constexpr std::int64_t ms = 1'000'000;
 constexpr double count_rev = 1.0 / 4096.0;
 constexpr rig::Command drive{.motor_duty = 0.5, .motor_enable = true};
 
-void start(UsbDriver& driver) {
+void start(RigDriver& driver) {
   driver.configure();
   driver.activate(0);
 }
@@ -33,7 +32,8 @@ std::int64_t stepping_clock() noexcept { return clock_ns += step_ns; }
 
 TEST_CASE("Encoders are taken from the channels configured, with their signs") {
   ModelBoard board({.lower_encoder = 5, .upper_encoder = 2});
-  UsbDriver driver({.lower_channel = 5, .upper_channel = 2, .upper_sign = -1}, board.opener());
+  const auto own_driver = usb::usb_driver({.lower_channel = 5, .upper_channel = 2, .upper_sign = -1}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   start(driver);
   board.model.turn_by_hand(true, 10.5 * count_rev);
   board.model.turn_by_hand(false, 20.5 * count_rev);
@@ -47,7 +47,8 @@ TEST_CASE("Counters continue across a wrap at 16, 31 and 32 bits") {
   const double start_counts = GENERATE(65530.0, 2147483640.0, 4294967290.0, -6.0);
   ModelBoard board;
   board.model.turn_by_hand(true, (start_counts + 0.5) * count_rev);
-  UsbDriver driver({}, board.opener());
+  const auto own_driver = usb::usb_driver({}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   start(driver);
   rig::Measurement measurement;
   for (int travelled = 1; travelled <= 20; ++travelled) {
@@ -59,11 +60,13 @@ TEST_CASE("Counters continue across a wrap at 16, 31 and 32 bits") {
 
 TEST_CASE("Drive and brake go to the PWMs configured; others keep what the board showed") {
   ModelBoard board({.drive_pwm = 4, .brake_pwm = 9});
-  UsbDriver first({.drive_pwm = 2, .brake_pwm = 3}, board.opener());
+  const auto own_first = usb::usb_driver({.drive_pwm = 2, .brake_pwm = 3}, board.opener());
+  driver::RigDriver& first = *own_first;
   start(first);
   REQUIRE(first.write({.motor_duty = 1.0, .motor_enable = true}).ok());
   CHECK(board.model.outputs().drive_duty == 0.0);
-  UsbDriver driver({.drive_pwm = 4, .brake_pwm = 9}, board.opener());
+  const auto own_driver = usb::usb_driver({.drive_pwm = 4, .brake_pwm = 9}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   start(driver);
   REQUIRE(driver.write(drive).ok());
   CHECK(std::abs(board.model.outputs().drive_duty - 0.5) < 1e-3);
@@ -78,7 +81,8 @@ TEST_CASE("Drive and brake go to the PWMs configured; others keep what the board
 TEST_CASE("The enable line is out, and on only while the motor is enabled") {
   const bool inverted = GENERATE(false, true);
   ModelBoard board({.enable_line = inverted ? -1 : 3});
-  UsbDriver driver({.enable_line = 3, .enable_inverted = inverted}, board.opener());
+  const auto own_driver = usb::usb_driver({.enable_line = 3, .enable_inverted = inverted}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   start(driver);
   const auto line = [&board] { return (usb::word_at(board.model.image(), 14) >> 3U & 1U) != 0; };
   CHECK(line() == inverted);
@@ -95,11 +99,13 @@ TEST_CASE("The enable line is out, and on only while the motor is enabled") {
 
 TEST_CASE("Mode and prescaler change only when the widths are 0") {
   ModelBoard board;
-  UsbDriver before({.pwm_mode = "12-bit"}, board.opener());
+  const auto own_before = usb::usb_driver({.pwm_mode = "12-bit"}, board.opener());
+  driver::RigDriver& before = *own_before;
   start(before);
   REQUIRE(before.write({.brake_duty = 0.1}).ok());  // 410 of 4095 would be all of 255
   // The next owner counts to 255: had it changed the mode first, the brake would have been fully on.
-  UsbDriver driver({.pwm_mode = "8-bit", .pwm_prescaler = 44}, board.opener());
+  const auto own_driver = usb::usb_driver({.pwm_mode = "8-bit", .pwm_prescaler = 44}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   const std::uint64_t frames = board.model.frames_taken();
   start(driver);
   CHECK(board.model.frames_taken() == frames + 2);
@@ -112,7 +118,8 @@ TEST_CASE("A measurement is stamped with the middle between request and answer")
   ModelBoard board;
   clock_ns = 0;
   step_ns = 0;
-  UsbDriver driver({}, board.opener(), stepping_clock);
+  const auto own_driver = usb::usb_driver({}, board.opener(), stepping_clock);
+  driver::RigDriver& driver = *own_driver;
   start(driver);
   clock_ns = 10 * ms;
   step_ns = 100'000;
@@ -124,17 +131,20 @@ TEST_CASE("A measurement is stamped with the middle between request and answer")
 
 TEST_CASE("Another version word is refused before any output is written") {
   ModelBoard board({.version = 104});
-  UsbDriver driver({.version = 103}, board.opener());
+  const auto own_driver = usb::usb_driver({.version = 103}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   CHECK_THROWS_WITH(driver.configure(), Contains("version word 104 is not the configured 103"));
   CHECK(board.model.frames_taken() == 0);
-  UsbDriver right({.version = 104}, board.opener());
+  const auto own_right = usb::usb_driver({.version = 104}, board.opener());
+  driver::RigDriver& right = *own_right;
   right.configure();
   CHECK(right.state() == DriverState::inactive);
 }
 
 TEST_CASE("The driver's notes about the board name what is not known") {
   ModelBoard board;
-  UsbDriver driver({}, board.opener());
+  const auto own_driver = usb::usb_driver({}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   CHECK(driver.notes().empty());
   driver.configure();
   std::string notes;
@@ -149,9 +159,9 @@ TEST_CASE("The driver's notes about the board name what is not known") {
 
 TEST_CASE("Options that contradict each other are named") {
   ModelBoard board;
-  CHECK_THROWS_WITH(UsbDriver({.upper_sign = 0}, board.opener()), Contains("driver.usb.upper_sign = 0"));
-  CHECK_THROWS_WITH(UsbDriver({.lower_channel = 1}, board.opener()), Contains("driver.usb.lower_channel"));
-  CHECK_THROWS_WITH(UsbDriver({.brake_pwm = 0}, board.opener()), Contains("driver.usb.drive_pwm"));
+  CHECK_THROWS_WITH(usb::usb_driver({.upper_sign = 0}, board.opener()), Contains("driver.usb.upper_sign = 0"));
+  CHECK_THROWS_WITH(usb::usb_driver({.lower_channel = 1}, board.opener()), Contains("driver.usb.lower_channel"));
+  CHECK_THROWS_WITH(usb::usb_driver({.brake_pwm = 0}, board.opener()), Contains("driver.usb.drive_pwm"));
 }
 
 TEST_CASE("The backend is marked as not verified on hardware until the configuration says otherwise") {

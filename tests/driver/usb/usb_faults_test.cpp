@@ -9,7 +9,6 @@ using namespace abs_hil::driver;
 using Catch::Matchers::Contains;
 using rig::Reason;
 using test::ModelBoard;
-using usb::UsbDriver;
 
 namespace {
 
@@ -17,7 +16,7 @@ constexpr std::int64_t ms = 1'000'000;
 constexpr rig::Command drive{.motor_duty = 0.5, .motor_enable = true};
 
 struct Running {
-  explicit Running(const usb::UsbOptions& options = {}) : driver(options, board.opener()) {
+  explicit Running(const usb::UsbOptions& options = {}) : own(usb::usb_driver(options, board.opener())), driver(*own) {
     driver.configure();
     driver.activate(0);
     REQUIRE(cycle().ok());
@@ -31,7 +30,8 @@ struct Running {
   }
 
   ModelBoard board{{.start_speed_rad_s = 60.0}};
-  UsbDriver driver;
+  std::unique_ptr<RigDriver> own;
+  RigDriver& driver;
   std::int64_t now_ms{0};
   rig::Measurement measurement{};
 };
@@ -45,7 +45,7 @@ TEST_CASE("A cycle without its frame keeps the previous measurement with its tim
   REQUIRE(run.cycle().ok());
   CHECK(run.measurement.time_ns == before.time_ns);
   CHECK(run.measurement.upper_counts == before.upper_counts);
-  CHECK(run.driver.frames_lost() == 1);
+  CHECK(run.driver.tally() == std::vector<std::string>{"USB board: 1 cycles without their frame"});
 }
 
 TEST_CASE("A late answer does not count as the answer of the cycle in which it arrives") {
@@ -56,7 +56,7 @@ TEST_CASE("A late answer does not count as the answer of the cycle in which it a
   CHECK(run.measurement.time_ns == 3 * ms);
   // 60 rad/s are 39 counts a ms: those of 3 ms since activation at 0.
   CHECK(std::abs(run.measurement.upper_counts - 117) <= 2);
-  CHECK(run.driver.frames_lost() == 1);
+  CHECK(run.driver.tally() == std::vector<std::string>{"USB board: 1 cycles without their frame"});
 }
 
 TEST_CASE("Four cycles without a frame pass, the fifth is a fault; commands go on reaching the board") {
@@ -168,12 +168,14 @@ TEST_CASE("An output that is not shown as it was sent is found with the next fra
 
 TEST_CASE("A board that does not show its outputs: refused with the key, or run without verification") {
   ModelBoard board({.shows_outputs = false});
-  UsbDriver strict({}, board.opener());
+  const auto own_strict = usb::usb_driver({}, board.opener());
+  driver::RigDriver& strict = *own_strict;
   strict.configure();
   CHECK_THROWS_WITH(strict.activate(0),
                     Contains("taking over the outputs failed") && Contains("set driver.usb.verify_outputs=false"));
   CHECK(board.model.outputs().drive_duty == 0.0);
-  UsbDriver trusting({.verify_outputs = false}, board.opener());
+  const auto own_trusting = usb::usb_driver({.verify_outputs = false}, board.opener());
+  driver::RigDriver& trusting = *own_trusting;
   trusting.configure();
   trusting.activate(0);
   rig::Measurement measurement;
@@ -187,7 +189,8 @@ TEST_CASE("A board that does not show its outputs: refused with the key, or run 
 
 TEST_CASE("A board whose first frame is invalid or missing is refused") {
   ModelBoard board;
-  UsbDriver driver({}, board.opener());
+  const auto own_driver = usb::usb_driver({}, board.opener());
+  driver::RigDriver& driver = *own_driver;
   SECTION("short") {
     board.faults.length = 64;
     CHECK_THROWS_WITH(driver.configure(), Contains("has 64 bytes, not 504"));

@@ -15,7 +15,8 @@ namespace {
 struct Left {
   explicit Left(const usb::UsbOptions& options = {}, const emulator::UsbBoardOptions& board_options = {})
       : board(board_options), writer(usb::safe_state_writer(options, board.opener())) {
-    usb::UsbDriver owner(options, board.opener());
+    const auto own_owner = usb::usb_driver(options, board.opener());
+    driver::RigDriver& owner = *own_owner;
     owner.configure();
     owner.activate(0);
     rig::Measurement measurement;

@@ -29,9 +29,7 @@ class SimulatedRig final : public MatrixRig {
 class EmulatedCard final : public MatrixRig {
  public:
   explicit EmulatedCard(const Setup& setup) : card_({.plant = setup.plant}) {}
-  std::unique_ptr<driver::RigDriver> driver() override {
-    return std::make_unique<driver::pci::PciDriver>(driver::pci::PciOptions{}, card_.opener());
-  }
+  std::unique_ptr<driver::RigDriver> driver() override { return driver::pci::pci_driver({}, card_.opener()); }
   bool at_rest() const override {
     const emulator::Outputs out = card_.model.outputs();
     return out.drive_duty == 0.0 && out.brake_duty == 0.0;
