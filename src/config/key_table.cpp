@@ -124,19 +124,6 @@ rig::SafetyClass safety_of(const Key& key) {
   return of_the_run ? rig::no_effect_on_safety : key.safety;
 }
 
-std::vector<runtime::WeakValue> weak_values(const KeyTable& keys) {
-  std::vector<runtime::WeakValue> weak;
-  for (const Key& key : keys.keys()) {
-    if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
-    weak.push_back({.key = key.name,
-                    .value = text_of(value_of(key)),
-                    .class_text = key.safety.in_words(key.unit),
-                    .consent = std::string(key.safety.consent),
-                    .meaning = std::string(key.meaning)});
-  }
-  return weak;
-}
-
 std::string number_text(const Settings& settings, std::string_view name) {
   Settings copy = settings;
   const KeyTable keys(copy);

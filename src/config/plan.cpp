@@ -214,7 +214,7 @@ void apply(const Script& script, Settings& s) {
   tighten(s.gate.overspeed_rad_s, limits.wheel_speed);
   tighten(s.gate.motor_duty_max, limits.motor_duty);
   tighten(s.gate.brake_duty_max, limits.brake_duty);
-  // As runtime::apply_board_limits does with a board's cap, so that gate and controllers know it.
+  // As apply_board_limits does with a board's cap, so that gate and controllers know it.
   if (!s.on_rig()) s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, s.plant.brake_duty_max);
   if (s.inject.empty()) {
     for (const EventScript& event : script.events) {

@@ -7,13 +7,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "config/board_policy.hpp"
 #include "config/config_file.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"
-#include "runtime/board_policy.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -50,7 +50,7 @@ int doctor(const config::Settings& s, const std::string& only, bool json) {
                                        lease = guardian::ask_for_lease(s, false);
                                        return run::make_driver(s);
                                      }};
-  if (s.on_rig() && runtime::is_real_board(s.driver)) {
+  if (s.on_rig() && config::is_real_board(s.driver)) {
     examination.require_commissioned = [&s](const driver::RigDriver& driver) {
       static_cast<void>(experiment::require_record(s.driver, s.rig, driver.identity()));
     };

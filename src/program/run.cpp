@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "analysis/run_summary.hpp"
+#include "config/board_policy.hpp"
 #include "config/plan.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
@@ -29,7 +30,6 @@
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "run/run_summary.hpp"
-#include "runtime/board_policy.hpp"
 #include "runtime/record_pump.hpp"
 
 namespace abs_hil::program {
@@ -245,7 +245,7 @@ void require_own_guardian(const driver::DriverOptions& board) {
 void require_resources(run::Run& run, bool has_lease) {
   run.driver().configure();
   const config::Settings& s = run.settings();
-  if (s.on_rig() && runtime::is_real_board(s.driver)) {
+  if (s.on_rig() && config::is_real_board(s.driver)) {
     const std::string note = experiment::require_record(s.driver, s.rig, run.driver().identity());
     if (!note.empty()) spdlog::warn("{}", note);
   }
