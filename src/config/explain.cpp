@@ -33,10 +33,6 @@ std::string in_words(const experiment::Profile& profile, std::string_view unit) 
   return text;
 }
 
-std::string in_words(const experiment::Profile& profile, double constant, std::string_view unit) {
-  return profile.empty() ? number(constant) + std::string(unit) : in_words(profile, unit);
-}
-
 std::string in_words(const experiment::EndCondition& end) {
   std::string text = fmt::format(fmt::runtime(experiment::row_of(end.kind).in_words), number(end.value));
   if (end.reason == rig::Reason::slip_control_left_at_low_speed) text += " (least speed for slip control)";
@@ -48,12 +44,12 @@ std::string in_words(const experiment::EndCondition& end) {
 std::string brake_in_words(const experiment::PhasePlan& phase, const Settings& s, bool goes_on) {
   switch (phase.brake) {
     case BrakeAction::released: return "off";
-    case BrakeAction::torque: return "torque " + in_words(phase.brake_profile, phase.brake_torque_Nm, " N m");
-    case BrakeAction::duty: return "duty " + in_words(phase.brake_profile, phase.brake_duty, "");
+    case BrakeAction::torque: return "torque " + in_words(phase.brake_torque_Nm, " N m");
+    case BrakeAction::duty: return "duty " + in_words(phase.brake_duty, "");
     case BrakeAction::slip_control: break;
   }
   return fmt::format("controller {}{}, slip reference {}", s.control.controller, goes_on ? " (goes on)" : "",
-                     in_words(phase.slip_ref_profile, s.control.slip_ref, ""));
+                     phase.slip_ref.empty() ? number(s.control.slip_ref) : in_words(phase.slip_ref, ""));
 }
 
 void add_series(const Script& script, const Settings& s, std::string& text) {
@@ -94,9 +90,7 @@ std::string explain(const Script& script, const Settings& settings) {
     if (!phase.question.empty()) ends = fmt::format("a person has answered: \"{}\"", phase.question);
     text += fmt::format("{}. {} ({}): {}motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
                         rig::name_of(phase.phase), phase.wheels_apart ? "wheels apart, " : "",
-                        phase.motor_profile.empty() && phase.motor_duty == 0.0
-                            ? "off"
-                            : "duty " + in_words(phase.motor_profile, phase.motor_duty, ""),
+                        phase.motor_duty.zero() ? "off" : "duty " + in_words(phase.motor_duty, ""),
                         brake_in_words(phase, s, goes_on), ends, number(phase.time_limit_s));
   }
   text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
