@@ -8,7 +8,7 @@
 #include "abs_hil/rig/option.hpp"
 #include "driver/factory.hpp"
 #include "experiment/options.hpp"
-#include "runtime/command_gate.hpp"
+#include "runtime/gate_options.hpp"
 #include "runtime/realtime_setup.hpp"
 
 namespace abs_hil::config {

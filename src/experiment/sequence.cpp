@@ -2,7 +2,6 @@
 #include "experiment/sequence.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 

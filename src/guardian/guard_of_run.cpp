@@ -16,7 +16,6 @@
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
 #include "guardian/guard.hpp"
-#include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
 #include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"

@@ -10,9 +10,6 @@ namespace abs_hil::runtime {
 /// The outputs of a run, for the moment in which the program is about to end.
 class Outputs {
  public:
-  Outputs() = default;
-  Outputs(const Outputs&) = delete;
-  Outputs& operator=(const Outputs&) = delete;
   virtual ~Outputs() = default;
   /// In the cycle's thread: makes the outputs safe. True if that is verified.
   virtual bool make_safe_now() noexcept = 0;
