@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "config/config_error.hpp"
-#include "files/result_file.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {
@@ -53,6 +52,12 @@ void check_questions(const RunRequest& request) {
         "experiment {}: experiment.answers = itself: on a rig only a person can say that it is done; leave it out",
         request.script->name));
   }
+}
+
+std::unique_ptr<files::ResultFile> open_result(const std::optional<std::string>& path, const std::string& kind) try {
+  return path ? std::make_unique<files::ResultFile>(*path, kind) : nullptr;
+} catch (const std::runtime_error& error) {
+  throw config::ConfigError(error.what());
 }
 
 void keep_inputs(const config::Sources& sources) {

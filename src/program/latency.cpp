@@ -13,7 +13,6 @@
 #include "config/config_error.hpp"
 #include "diagnosis/latency_verdict.hpp"
 #include "experiment/sequence.hpp"
-#include "files/result_file.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
@@ -78,12 +77,7 @@ int latency(const LatencyOptions& options) {
   // Gaps in the simulation are what this command measures; they must not end it.
   constexpr double any_gap_s = 3600.0;
   if (!on_rig) s.realtime.overruns.cycle_gap_max_s = any_gap_s;
-  std::optional<files::ResultFile> histogram;
-  try {
-    if (options.histogram_file) histogram.emplace(*options.histogram_file, "histogram");
-  } catch (const std::runtime_error& error) {
-    throw config::ConfigError(error.what());
-  }
+  const auto histogram = open_result(options.histogram_file, "histogram");
   const std::unique_ptr<guardian::GuardianLease> lease = guardian::ask_for_lease(s, false);
   // A board is read and gets zeros. No wheel turns.
   const config::Plan idle{.phases = {timed(rig::Phase::idle, options.duration_s)}};
