@@ -70,6 +70,28 @@ void add_series(const Script& script, const Settings& s, std::string& text) {
                       number(series.pause_s), varied);
 }
 
+std::string facts_of(const Key& key) {
+  const bool is_number =
+      std::holds_alternative<double*>(key.target) || std::holds_alternative<std::int32_t*>(key.target);
+  std::string text = fmt::format("# {}", key.meaning);
+  if (is_number) text += fmt::format("; {}{}{}", key.range.text(), key.unit.empty() ? "" : " ", key.unit);
+  if (!key.allowed.empty()) text += fmt::format("; {}", fmt::join(key.allowed.list(), ", "));
+  return text + '\n';
+}
+
+/// The keys of the rig's parameters, or those of the simulation only.
+std::string section(const KeyTable& keys, bool of_rig) {
+  constexpr std::string_view prefix = "plant.";
+  std::string text;
+  for (const Key& key : keys.keys()) {
+    if (!key.name.starts_with(prefix) || key.on_rig.empty() == of_rig) continue;
+    text += '\n' + facts_of(key);
+    if (of_rig) text += fmt::format("# on the rig: {}\n", key.on_rig);
+    text += fmt::format("{} = {}\n", key.name.substr(prefix.size()), toml_of(value_of(key)));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string explain(const Script& script, const Settings& settings) {
@@ -110,32 +132,6 @@ std::string explain(const Script& script, const Settings& settings) {
   add_series(script, s, text);
   return text;
 }
-
-namespace {
-
-std::string facts_of(const Key& key) {
-  const bool is_number =
-      std::holds_alternative<double*>(key.target) || std::holds_alternative<std::int32_t*>(key.target);
-  std::string text = fmt::format("# {}", key.meaning);
-  if (is_number) text += fmt::format("; {}{}{}", key.range.text(), key.unit.empty() ? "" : " ", key.unit);
-  if (!key.allowed.empty()) text += fmt::format("; {}", fmt::join(key.allowed.list(), ", "));
-  return text + '\n';
-}
-
-/// The keys of the rig's parameters, or those of the simulation only.
-std::string section(const KeyTable& keys, bool of_rig) {
-  constexpr std::string_view prefix = "plant.";
-  std::string text;
-  for (const Key& key : keys.keys()) {
-    if (!key.name.starts_with(prefix) || key.on_rig.empty() == of_rig) continue;
-    text += '\n' + facts_of(key);
-    if (of_rig) text += fmt::format("# on the rig: {}\n", key.on_rig);
-    text += fmt::format("{} = {}\n", key.name.substr(prefix.size()), toml_of(value_of(key)));
-  }
-  return text;
-}
-
-}  // namespace
 
 std::string rig_file(const Settings& settings, std::string_view name) {
   Settings copy = settings;
