@@ -39,7 +39,7 @@ class Group:
 
 GATE = Group('runtime',
              ['command_gate', 'run_latch', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits',
-              'weak_values', 'safety_class'],
+              'safety_class'],
              ['runtime/gate/*_test.cpp'],
              ('<algorithm>', '<array>', '<atomic>', '<cmath>', '<utility>', '"abs_hil/rig/brake_map.hpp"',
               '"abs_hil/rig/command.hpp"', '"abs_hil/rig/measurement.hpp"', '"abs_hil/rig/scalar.hpp"',

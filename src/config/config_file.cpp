@@ -60,6 +60,23 @@ std::vector<FileValue> values_of(const toml::table& table, const fs::path& file)
   return values;
 }
 
+/// The first of the places that is a folder.
+fs::path first_folder(const std::vector<fs::path>& places) {
+  std::error_code error;
+  for (const fs::path& place : places) {
+    if (fs::is_directory(place, error)) return place;
+  }
+  throw ConfigError(fmt::format("no configuration folder at {}; set ABS_HIL_CONFIG_DIR to the project's config/",
+                                places.back().string()));
+}
+
+fs::path plants_dir() { return config_dir() / "plants"; }
+
+fs::path& given_own_config_dir() {
+  static fs::path folder;
+  return folder;
+}
+
 }  // namespace
 
 std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
@@ -105,27 +122,6 @@ std::vector<FileValue> read_model(const fs::path& file) {
   }
   return model;
 }
-
-namespace {
-
-/// The first of the places that is a folder.
-fs::path first_folder(const std::vector<fs::path>& places) {
-  std::error_code error;
-  for (const fs::path& place : places) {
-    if (fs::is_directory(place, error)) return place;
-  }
-  throw ConfigError(fmt::format("no configuration folder at {}; set ABS_HIL_CONFIG_DIR to the project's config/",
-                                places.back().string()));
-}
-
-fs::path plants_dir() { return config_dir() / "plants"; }
-
-fs::path& given_own_config_dir() {
-  static fs::path folder;
-  return folder;
-}
-
-}  // namespace
 
 void set_own_config_dir(fs::path folder) { given_own_config_dir() = std::move(folder); }
 

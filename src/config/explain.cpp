@@ -33,10 +33,6 @@ std::string in_words(const experiment::Profile& profile, std::string_view unit) 
   return text;
 }
 
-std::string in_words(const experiment::Profile& profile, double constant, std::string_view unit) {
-  return profile.empty() ? number(constant) + std::string(unit) : in_words(profile, unit);
-}
-
 std::string in_words(const experiment::EndCondition& end) {
   std::string text = fmt::format(fmt::runtime(experiment::row_of(end.kind).in_words), number(end.value));
   if (end.reason == rig::Reason::slip_control_left_at_low_speed) text += " (least speed for slip control)";
@@ -48,12 +44,12 @@ std::string in_words(const experiment::EndCondition& end) {
 std::string brake_in_words(const experiment::PhasePlan& phase, const Settings& s, bool goes_on) {
   switch (phase.brake) {
     case BrakeAction::released: return "off";
-    case BrakeAction::torque: return "torque " + in_words(phase.brake_profile, phase.brake_torque_Nm, " N m");
-    case BrakeAction::duty: return "duty " + in_words(phase.brake_profile, phase.brake_duty, "");
+    case BrakeAction::torque: return "torque " + in_words(phase.brake_torque_Nm, " N m");
+    case BrakeAction::duty: return "duty " + in_words(phase.brake_duty, "");
     case BrakeAction::slip_control: break;
   }
   return fmt::format("controller {}{}, slip reference {}", s.control.controller, goes_on ? " (goes on)" : "",
-                     in_words(phase.slip_ref_profile, s.control.slip_ref, ""));
+                     phase.slip_ref.empty() ? number(s.control.slip_ref) : in_words(phase.slip_ref, ""));
 }
 
 void add_series(const Script& script, const Settings& s, std::string& text) {
@@ -73,51 +69,6 @@ void add_series(const Script& script, const Settings& s, std::string& text) {
   text += fmt::format("Series of {} runs, {}, in real time {} s apart\n{}", members.size(), seeds,
                       number(series.pause_s), varied);
 }
-
-}  // namespace
-
-std::string explain(const Script& script, const Settings& settings) {
-  Settings s = settings;
-  apply(script, s);
-  std::string text =
-      fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
-  if (!script.series.experiments.empty()) {
-    add_series(script, s, text);
-    return text;
-  }
-  const Plan plan = abs_hil::config::plan(script, s);
-  for (std::size_t i = 0; i < plan.phases.size(); ++i) {
-    const experiment::PhasePlan& phase = plan.phases[i];
-    const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
-    std::string ends;
-    for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
-    if (!phase.question.empty()) ends = fmt::format("a person has answered: \"{}\"", phase.question);
-    text += fmt::format("{}. {} ({}): {}motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
-                        rig::name_of(phase.phase), phase.wheels_apart ? "wheels apart, " : "",
-                        phase.motor_profile.empty() && phase.motor_duty == 0.0
-                            ? "off"
-                            : "duty " + in_words(phase.motor_profile, phase.motor_duty, ""),
-                        brake_in_words(phase, s, goes_on), ends, number(phase.time_limit_s));
-  }
-  text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
-                      number(s.gate.motor_duty_max), number(s.gate.brake_duty_max));
-  if (std::isfinite(plan.limits.run_time_s)) text += fmt::format(", run {} s", number(plan.limits.run_time_s));
-  if (std::isfinite(plan.limits.distance_m)) text += fmt::format(", distance {} m", number(plan.limits.distance_m));
-  text += '\n';
-  for (const ChangingPart& part : changing_parts()) {
-    const std::string& profile = part.profile(s);
-    if (!profile.empty()) text += fmt::format("Simulation only: {}, a factor over {}\n", part.in_words, profile);
-  }
-  if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
-  for (const Setting& setting : script.settings) {
-    text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
-  }
-  if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
-  add_series(script, s, text);
-  return text;
-}
-
-namespace {
 
 std::string facts_of(const Key& key) {
   const bool is_number =
@@ -142,6 +93,45 @@ std::string section(const KeyTable& keys, bool of_rig) {
 }
 
 }  // namespace
+
+std::string explain(const Script& script, const Settings& settings) {
+  Settings s = settings;
+  apply(script, s);
+  std::string text =
+      fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
+  if (!script.series.experiments.empty()) {
+    add_series(script, s, text);
+    return text;
+  }
+  const Plan plan = abs_hil::config::plan(script, s);
+  for (std::size_t i = 0; i < plan.phases.size(); ++i) {
+    const experiment::PhasePlan& phase = plan.phases[i];
+    const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
+    std::string ends;
+    for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
+    if (!phase.question.empty()) ends = fmt::format("a person has answered: \"{}\"", phase.question);
+    text += fmt::format("{}. {} ({}): {}motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
+                        rig::name_of(phase.phase), phase.wheels_apart ? "wheels apart, " : "",
+                        phase.motor_duty.zero() ? "off" : "duty " + in_words(phase.motor_duty, ""),
+                        brake_in_words(phase, s, goes_on), ends, number(phase.time_limit_s));
+  }
+  text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
+                      number(s.gate.motor_duty_max), number(s.gate.brake_duty_max));
+  if (std::isfinite(plan.limits.run_time_s)) text += fmt::format(", run {} s", number(plan.limits.run_time_s));
+  if (std::isfinite(plan.limits.distance_m)) text += fmt::format(", distance {} m", number(plan.limits.distance_m));
+  text += '\n';
+  for (const ChangingPart& part : changing_parts()) {
+    const std::string& profile = part.profile(s);
+    if (!profile.empty()) text += fmt::format("Simulation only: {}, a factor over {}\n", part.in_words, profile);
+  }
+  if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
+  for (const Setting& setting : script.settings) {
+    text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
+  }
+  if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
+  add_series(script, s, text);
+  return text;
+}
 
 std::string rig_file(const Settings& settings, std::string_view name) {
   Settings copy = settings;

@@ -66,6 +66,29 @@ constexpr std::string_view plant_prefix = "plant.";
 constexpr std::string_view model_prefix = "model.";
 constexpr std::string_view identity_prefix = "rig.";
 
+void set_values(const nlohmann::ordered_json& node, const std::string& name, KeyTable& table, std::string_view origin,
+                std::vector<std::string>& unknown) {
+  if (node.is_object()) {
+    for (const auto& [key, value] : node.items()) {
+      set_values(value, name.empty() ? key : fmt::format("{}.{}", name, key), table, origin, unknown);
+    }
+    return;
+  }
+  if (find_key(table.keys(), name) == nullptr) {
+    unknown.push_back(name);
+  } else if (node.is_boolean()) {
+    table.set(name, node.get<bool>(), origin);
+  } else if (node.is_number_integer()) {
+    table.set(name, node.get<std::int64_t>(), origin);
+  } else if (node.is_number()) {
+    table.set(name, node.get<double>(), origin);
+  } else if (node.is_string()) {
+    table.set(name, node.get<std::string>(), origin);
+  } else {
+    throw ConfigError(std::string(origin) + ": " + name + " is neither a number, a flag nor a text; give one of them");
+  }
+}
+
 }  // namespace
 
 KeyTable::KeyTable(Settings& settings) {
@@ -122,19 +145,6 @@ rig::SafetyClass safety_of(const Key& key) {
   const bool of_the_run = begins(plant_prefix) || begins(model_prefix) || begins("control.") || begins("telemetry.") ||
                           begins("commands.") || begins("run.");
   return of_the_run ? rig::no_effect_on_safety : key.safety;
-}
-
-std::vector<runtime::WeakValue> weak_values(const KeyTable& keys) {
-  std::vector<runtime::WeakValue> weak;
-  for (const Key& key : keys.keys()) {
-    if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
-    weak.push_back({.key = key.name,
-                    .value = text_of(value_of(key)),
-                    .class_text = key.safety.in_words(key.unit),
-                    .consent = std::string(key.safety.consent),
-                    .meaning = std::string(key.meaning)});
-  }
-  return weak;
 }
 
 std::string number_text(const Settings& settings, std::string_view name) {
@@ -262,33 +272,6 @@ nlohmann::ordered_json KeyTable::to_json() const {
   }
   return root;
 }
-
-namespace {
-
-void set_values(const nlohmann::ordered_json& node, const std::string& name, KeyTable& table, std::string_view origin,
-                std::vector<std::string>& unknown) {
-  if (node.is_object()) {
-    for (const auto& [key, value] : node.items()) {
-      set_values(value, name.empty() ? key : fmt::format("{}.{}", name, key), table, origin, unknown);
-    }
-    return;
-  }
-  if (find_key(table.keys(), name) == nullptr) {
-    unknown.push_back(name);
-  } else if (node.is_boolean()) {
-    table.set(name, node.get<bool>(), origin);
-  } else if (node.is_number_integer()) {
-    table.set(name, node.get<std::int64_t>(), origin);
-  } else if (node.is_number()) {
-    table.set(name, node.get<double>(), origin);
-  } else if (node.is_string()) {
-    table.set(name, node.get<std::string>(), origin);
-  } else {
-    throw ConfigError(std::string(origin) + ": " + name + " is neither a number, a flag nor a text; give one of them");
-  }
-}
-
-}  // namespace
 
 std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTable& table, std::string_view origin) {
   if (!config.is_object())

@@ -14,7 +14,6 @@
 
 #include "abs_hil/rig/option.hpp"
 #include "config/settings.hpp"
-#include "runtime/board_policy.hpp"
 
 namespace abs_hil::config {
 
@@ -93,9 +92,6 @@ class KeyTable {
   bool has_plant_{true};
   std::set<std::string, std::less<>> set_;  ///< names of the values that a file or an option gave
 };
-
-/// The values that weaken the protection of a real board, for runtime::refuse_unsafe_use.
-[[nodiscard]] std::vector<runtime::WeakValue> weak_values(const KeyTable& keys);
 
 /// Sets every value of an effective configuration, as KeyTable::to_json writes it. Throws ConfigError for a value that
 /// does not fit its key. Returns the unknown names, which another version wrote.

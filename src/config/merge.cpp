@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
+#include "config/board_policy.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "config/model.hpp"
@@ -21,7 +22,6 @@
 #include "driver/injection/injection.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
-#include "runtime/board_policy.hpp"
 
 namespace abs_hil::config {
 
@@ -32,7 +32,7 @@ constexpr const char* experiment_key = "experiment.name";
 /// The mode of --rt; none: real time is required on a real board, otherwise preferred.
 runtime::RealtimeMode realtime_mode(const std::optional<std::string>& name, const Settings& s) {
   if (!name) {
-    const bool real = s.on_rig() && runtime::is_real_board(s.driver);
+    const bool real = s.on_rig() && is_real_board(s.driver);
     return real ? runtime::RealtimeMode::require : runtime::RealtimeMode::prefer;
   }
   if (*name == "require") return runtime::RealtimeMode::require;
@@ -70,39 +70,12 @@ void refuse_events(const Script& script, bool emulated) {
 void check_consents(const Settings& s, const KeyTable& keys) {
   std::vector<std::string_view> names;
   for (const Key& key : keys.keys()) names.push_back(key.name);
-  for (std::size_t begin = 0; begin < s.unsafe.keys.size();) {
-    const std::size_t end = std::min(s.unsafe.keys.find(',', begin), s.unsafe.keys.size());
-    const std::string name = s.unsafe.keys.substr(begin, end - begin);
-    if (find_key(keys.keys(), name) == nullptr) {
-      throw ConfigError(fmt::format(
-          "unsafe.keys: unknown key \"{}\"; the nearest known key is {}; give keys separated by commas, without blanks",
-          name, fmt::join(rig::nearest_keys(name, names), " or ")));
-    }
-    begin = end + 1;
+  for (const std::string_view name : rig::split(s.unsafe.keys, ',')) {
+    if (name.empty() || find_key(keys.keys(), name) != nullptr) continue;
+    throw ConfigError(fmt::format(
+        "unsafe.keys: unknown key \"{}\"; the nearest known key is {}; give keys separated by commas, without blanks",
+        name, fmt::join(rig::nearest_keys(name, names), " or ")));
   }
-}
-
-/// The policy of the board, after all settings are known.
-void apply_board_policy(Settings& s, const KeyTable& keys, bool virtual_time) {
-  check_consents(s, keys);
-  const std::vector<std::string> accepted = runtime::refuse_unsafe_use(
-      {.driver = s.driver,
-       .guarded = s.guardian.enabled,
-       .virtual_time = virtual_time,
-       .rate_Hz = s.control.rate_Hz,
-       .guardian_timeout_ms = s.guardian.timeout_ms,
-       .unsafe = s.unsafe,
-       .start_speed_rad_s = s.experiment.start_speed_rad_s,
-       .injections = driver::parse_injections(s.inject),
-       .controller_file = control::is_controller_file(s.control.controller) ? s.control.controller : "",
-       .weak = weak_values(keys),
-       .model_counts_per_rev = s.model.encoder_counts_per_rev,
-       .rig_counts_per_rev = s.rig.parameters.encoder_counts_per_rev});
-  for (const std::string& weak : accepted) warn_once(weak);
-  runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
-                                    .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
-                                   s.driver);
-  runtime::apply_board_limits(s.rig.parameters, s.control.rate_Hz, s.gate, s.driver);
 }
 
 /// The names of plant and model. On a rig the plant's name is the model's.
@@ -245,7 +218,11 @@ void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   if (s.on_rig()) refuse_events(script, s.driver.emulated);
   apply(script, s);
   static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
-  if (s.on_rig()) apply_board_policy(s, keys, sources.virtual_time);
+  if (s.on_rig()) {
+    check_consents(s, keys);
+    for (const std::string& weak : refuse_unsafe_use(s, keys, sources.virtual_time)) warn_once(weak);
+    apply_board_limits(s, keys);
+  }
   for (const std::string& problem : theta_out_of_bounds(s)) warn_once(problem);
   for (const std::string& problem : negative_at_dead_zone(s)) warn_once(problem);
   if (const std::string problem = standstill_too_early(s); !problem.empty()) warn_once(problem);

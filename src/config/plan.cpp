@@ -88,13 +88,6 @@ class Planner {
     for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
     return experiment::Profile(std::move(points), script.between);
   }
-  /// Stores a constant in `constant` and returns an empty profile; returns any other profile.
-  [[nodiscard]] experiment::Profile profile_or(const std::optional<ProfileScript>& script, double& constant) const {
-    if (!script) return {};
-    if (!script->constant()) return profile(*script);
-    constant = value(script->points.front().second);
-    return {};
-  }
 
   [[nodiscard]] experiment::EndCondition condition(const ConditionScript& script) const {
     const experiment::EndRow& row = experiment::row_of(script.kind);
@@ -112,12 +105,11 @@ class Planner {
                                .restart = phase.restart,
                                .wheels_apart = phase.wheels_apart,
                                .question = phase.ask};
-    plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
-    if (plan.brake == BrakeAction::slip_control) {
-      // A constant too: it stands in place of control.slip_ref.
-      if (brake) plan.slip_ref_profile = profile(*brake);
-    } else {
-      plan.brake_profile = profile_or(brake, plan.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
+    if (phase.motor) plan.motor_duty = profile(*phase.motor);
+    if (brake) {
+      (plan.brake == BrakeAction::slip_control ? plan.slip_ref
+       : plan.brake == BrakeAction::duty       ? plan.brake_duty
+                                               : plan.brake_torque_Nm) = profile(*brake);
     }
     for (const ConditionScript& script : phase.until) {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
@@ -156,8 +148,8 @@ class Planner {
   KeyTable keys_;
 };
 
-double highest(const experiment::Profile& profile, double constant) {
-  double most = constant;
+double highest(const experiment::Profile& profile) {
+  double most = 0.0;
   for (const experiment::Profile::Point& point : profile.points()) most = std::max(most, point.value);
   return most;
 }
@@ -214,7 +206,7 @@ void apply(const Script& script, Settings& s) {
   tighten(s.gate.overspeed_rad_s, limits.wheel_speed);
   tighten(s.gate.motor_duty_max, limits.motor_duty);
   tighten(s.gate.brake_duty_max, limits.brake_duty);
-  // As runtime::apply_board_limits does with a board's cap, so that gate and controllers know it.
+  // As apply_board_limits does with a board's cap, so that gate and controllers know it.
   if (!s.on_rig()) s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, s.plant.brake_duty_max);
   if (s.inject.empty()) {
     for (const EventScript& event : script.events) {
@@ -239,11 +231,9 @@ std::vector<std::string> beyond_limits(const Plan& plan, const Settings& s) {
                                        phase.name, what, wanted, unit, most, unit, limit));
       }
     };
-    compare(highest(phase.motor_profile, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "", "motor_duty_max");
-    compare(highest(phase.brake_profile, phase.brake_torque_Nm) * (phase.brake == BrakeAction::torque ? 1.0 : 0.0),
-            most_torque_Nm, "brake torque", " N m", "brake_duty_max");
-    compare(highest(phase.brake_profile, phase.brake_duty) * (phase.brake == BrakeAction::duty ? 1.0 : 0.0),
-            s.gate.brake_duty_max, "brake duty", "", "brake_duty_max");
+    compare(highest(phase.motor_duty), s.gate.motor_duty_max, "motor duty", "", "motor_duty_max");
+    compare(highest(phase.brake_torque_Nm), most_torque_Nm, "brake torque", " N m", "brake_duty_max");
+    compare(highest(phase.brake_duty), s.gate.brake_duty_max, "brake duty", "", "brake_duty_max");
   }
   return problems;
 }

@@ -64,7 +64,6 @@ struct ProfileScript {
   std::vector<std::pair<Number, Number>> points{};  ///< time, value
   experiment::Between between{experiment::Between::line};
   Place place{};
-  [[nodiscard]] bool constant() const noexcept { return points.size() == 1; }
 };
 
 /// The keys that give a profile. The row of the phase's key gives the values their unit and their range.

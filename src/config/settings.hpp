@@ -8,10 +8,8 @@
 #include "abs_hil/rig/option.hpp"
 #include "driver/factory.hpp"
 #include "experiment/options.hpp"
-#include "runtime/command_gate.hpp"
-#include "runtime/guardian_options.hpp"
+#include "runtime/gate_options.hpp"
 #include "runtime/realtime_setup.hpp"
-#include "runtime/weak_values.hpp"
 
 namespace abs_hil::config {
 
@@ -35,6 +33,63 @@ struct CommandOptions {
   ABS_HIL_OPTION(std::string, key_file, "", .meaning = "file with the secret that senders of commands must know");
 };
 
+/// Everything below `guardian.` in the configuration.
+struct GuardianOptions {
+  ABS_HIL_OPTIONS(GuardianOptions);
+  ABS_HIL_OPTION(bool, enabled, true,
+                 .meaning = "guardian: watchdog process beside a run on a board; off only with driver.emulated",
+                 .safety = rig::judged_elsewhere);
+  ABS_HIL_OPTION(double, timeout_ms, 20.0, .unit = "ms",
+                 .meaning = "time without a sign of life of the cycle after which the guardian acts",
+                 .range = rig::between(2, 1000), .safety = rig::weaker_above(40, "outputs_on_after_death"));
+  /// Without end on hardware. An emulator that is gone does not come back.
+  ABS_HIL_OPTION(double, insist_s, 0.0, .unit = "s",
+                 .meaning =
+                     "how long the guardian tries to verify the safe state; 0: until it is, or a person releases "
+                     "it; 10 s on an emulator",
+                 .range = rig::from_zero(1e6), .safety = rig::weaker_unless(0));
+  ABS_HIL_OPTION(std::string, resident, "auto",
+                 .meaning =
+                     "who guards a run on a board. auto: the resident service on a real board if there is one, "
+                     "else a guardian of the run's own; require: the service; off: a guardian of the run's own",
+                 .allowed = {"auto", "require", "off"}, .safety = rig::weaker_if("off"));
+  ABS_HIL_OPTION(std::string, socket, "/run/abs_hil/guardian.sock",
+                 .meaning = "socket at which the resident service grants leases",
+                 .safety = rig::weaker_unless("/run/abs_hil/guardian.sock"));
+  ABS_HIL_OPTION(double, keep_ms, 5.0, .unit = "ms",
+                 .meaning = "while no run is covered: time from one look at the outputs to the next",
+                 .range = rig::between(1, 20), .safety = rig::weaker_above(10));
+  /// The guard looks every 5 ms at most. A computer without real-time scheduling needs more.
+  ABS_HIL_OPTION(double, standby_ms, 50.0, .unit = "ms",
+                 .meaning = "resident service: time without a sign of life of the guard after which its standby acts",
+                 .range = rig::between(20, 1000), .safety = rig::weaker_above(100));
+};
+
+/// Everything below `unsafe.` in the configuration: each key names a risk that a person accepts on hardware.
+struct UnsafeOptions {
+  ABS_HIL_OPTIONS(UnsafeOptions);
+  ABS_HIL_OPTION(bool, outputs_on_after_death, false,
+                 .meaning =
+                     "accept motor and brake on for longer than 50 ms after the program's death: allows "
+                     "guardian.timeout_ms above 40, driver.can.watchdog_ms above 50",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
+  ABS_HIL_OPTION(bool, blind_control, false,
+                 .meaning =
+                     "accept outputs on without fresh samples for longer than 50 ms: allows "
+                     "gate.sample_age_max_s above 0.05",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
+  ABS_HIL_OPTION(bool, foreign_controller, false,
+                 .meaning =
+                     "accept that code from a file, which no test of this project has seen, runs in the control cycle: "
+                     "allows --controller FILE on a board",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
+  ABS_HIL_OPTION(std::string, keys, "",
+                 .meaning =
+                     "accept the values of these keys, separated by commas, although they weaken the protection of a "
+                     "board: docs/rig-setup.md",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
+};
+
 /// One effective configuration. Later sources override earlier ones: the defaults, the plant's file, the model's file,
 /// the configuration file, the command line.
 struct Settings {
@@ -50,12 +105,12 @@ struct Settings {
   ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
   ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
   ABS_HIL_GROUP(driver::DriverOptions, driver, "driver.", {});
-  ABS_HIL_GROUP(runtime::GuardianOptions, guardian, "guardian.", {});
+  ABS_HIL_GROUP(GuardianOptions, guardian, "guardian.", {});
   ABS_HIL_GROUP(CommandOptions, commands, "commands.", {});
   ABS_HIL_GROUP(runtime::GateOptions, gate, "gate.", {});
   ABS_HIL_GROUP(runtime::RealtimeOptions, realtime, "realtime.", {});
   ABS_HIL_GROUP(TelemetryOptions, telemetry, "telemetry.", {});
-  ABS_HIL_GROUP(runtime::UnsafeOptions, unsafe, "unsafe.", {});
+  ABS_HIL_GROUP(UnsafeOptions, unsafe, "unsafe.", {});
   ABS_HIL_OPTION(std::string, inject, "", .key = "run.inject",
                  .meaning = "faults to inject, separated by commas (docs/fault-injection.md); never on hardware");
   ABS_HIL_OPTION(std::int64_t, seed, 1, .key = "run.seed", .meaning = "seed of everything random in the simulator",

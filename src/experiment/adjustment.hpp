@@ -21,9 +21,6 @@ struct Adjustment {
 /// for the other, and only the slow thread allocates and frees memory.
 class AdjustmentMailbox {
  public:
-  AdjustmentMailbox() = default;
-  AdjustmentMailbox(const AdjustmentMailbox&) = delete;
-  AdjustmentMailbox& operator=(const AdjustmentMailbox&) = delete;
   ~AdjustmentMailbox() {
     Arrived waiting{};
     while (inbox_.pop(waiting)) delete waiting.controller;

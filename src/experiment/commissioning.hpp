@@ -16,9 +16,6 @@ enum class Answer : std::uint8_t { yes, no, none };
 /// The dialog with the person at the rig.
 class Dialog {
  public:
-  Dialog() = default;
-  Dialog(const Dialog&) = delete;
-  Dialog& operator=(const Dialog&) = delete;
   virtual ~Dialog() = default;
 
   virtual void tell(const std::string& text) = 0;
@@ -32,9 +29,6 @@ class Dialog {
 /// A guard that makes the outputs safe if this program dies or hangs during a pulse.
 class PulseGuard {
  public:
-  PulseGuard() = default;
-  PulseGuard(const PulseGuard&) = delete;
-  PulseGuard& operator=(const PulseGuard&) = delete;
   virtual ~PulseGuard() = default;
 
   /// Called before the driver opens the board. Throws driver::Unavailable: then it stays closed.

@@ -299,7 +299,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, runtime::RunLat
   double torque_Nm = 0.0;
   double brake_duty = 0.0;
   if (plan.brake == BrakeAction::duty) {
-    brake_duty = plan.brake_duty_at(phase_time_s);
+    brake_duty = plan.brake_duty.at(phase_time_s);
     torque_Nm = rig::brake_torque_at(brake_, brake_duty);
   } else {
     const control::BrakeActuator::Target target = actuator_.next(wanted_torque_Nm(plan, dt_s, begins, state), dt_s);
@@ -313,7 +313,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, runtime::RunLat
   }
   state.brake_torque_ref_Nm = target_Nm_ = torque_Nm;
 
-  const double motor_duty = plan.motor_duty_at(phase_time_s);
+  const double motor_duty = plan.motor_duty.at(phase_time_s);
   return {.motor_duty = motor_duty,
           .brake_duty = brake_duty,
           .motor_enable = motor_duty > 0.0,
@@ -324,10 +324,10 @@ double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool begin
   switch (plan.brake) {
     case BrakeAction::released:
     case BrakeAction::duty: return 0.0;
-    case BrakeAction::torque: return plan.brake_torque_Nm_at(sequence_.phase_time_s());
+    case BrakeAction::torque: return plan.brake_torque_Nm.at(sequence_.phase_time_s());
     case BrakeAction::slip_control: break;
   }
-  if (!plan.slip_ref_profile.empty()) state.slip_ref = plan.slip_ref_profile.at(sequence_.phase_time_s());
+  if (!plan.slip_ref.empty()) state.slip_ref = plan.slip_ref.at(sequence_.phase_time_s());
   return slip_control(dt_s, begins, state);
 }
 

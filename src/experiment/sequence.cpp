@@ -2,7 +2,6 @@
 #include "experiment/sequence.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -20,32 +19,24 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
   if (!(plan.time_limit_s > 0.0 && plan.time_limit_s <= longest_phase_s)) {
     refuse(": time limit " + std::to_string(plan.time_limit_s) + " s: give a limit in (0, 600] s");
   }
-  if (!(plan.motor_duty >= 0.0 && plan.motor_duty <= 1.0)) {
-    refuse(": motor duty " + std::to_string(plan.motor_duty) + ": give a duty in [0, 1]");
-  }
-  if (!(plan.brake_torque_Nm >= 0.0 && std::isfinite(plan.brake_torque_Nm))) {
-    refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite torque >= 0");
-  }
-  const auto lies_within = [](const Profile& profile, double least, double most) {
-    return std::all_of(profile.points().begin(), profile.points().end(),
-                       [=](const Profile::Point& point) { return point.value >= least && point.value <= most; });
+  const auto require = [&refuse](const Profile& profile, double most, const std::string& what,
+                                 const std::string& give) {
+    for (const Profile::Point& point : profile.points()) {
+      if (!(point.value >= 0.0 && point.value <= most)) {
+        refuse(": " + what + ' ' + std::to_string(point.value) + ": give " + give);
+      }
+    }
   };
-  constexpr double unbounded = std::numeric_limits<double>::max();
-  if (!lies_within(plan.motor_profile, 0.0, 1.0))
-    refuse(": a motor duty of its profile is outside [0, 1]; give duties in [0, 1]");
-  if (!(plan.brake_duty >= 0.0 && plan.brake_duty <= 1.0))
-    refuse(": brake duty " + std::to_string(plan.brake_duty) + ": give a duty in [0, 1]");
-  if (!lies_within(plan.brake_profile, 0.0, plan.brake == BrakeAction::duty ? 1.0 : unbounded)) {
-    refuse(": a value of the brake profile is out of range; give duties in [0, 1] or torques >= 0");
-  }
-  if (!lies_within(plan.slip_ref_profile, 0.0, 1.0))
-    refuse(": a slip reference of its profile is outside [0, 1]; give references in (0, 1)");
+  require(plan.motor_duty, 1.0, "motor duty", "a duty in [0, 1]");
+  require(plan.brake_torque_Nm, std::numeric_limits<double>::max(), "brake torque", "a finite torque >= 0 N m");
+  require(plan.brake_duty, 1.0, "brake duty", "a duty in [0, 1]");
+  require(plan.slip_ref, 1.0, "slip reference", "a reference in (0, 1)");
   if (plan.wheels_apart && plan.brake == BrakeAction::slip_control)
     refuse(": wheels that are apart have no slip to control; give the brake a duty or a torque");
   const bool brakes = plan.brake == BrakeAction::slip_control ||
-                      (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0) ||
-                      (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_profile.empty();
-  const bool drives = plan.motor_duty > 0.0 || !plan.motor_profile.empty();
+                      (plan.brake == BrakeAction::torque && !plan.brake_torque_Nm.zero()) ||
+                      (plan.brake == BrakeAction::duty && !plan.brake_duty.zero());
+  const bool drives = !plan.motor_duty.zero();
   // Somebody may have a hand at the wheels.
   if (!plan.question.empty() && (drives || plan.brake != BrakeAction::released)) {
     refuse(": it asks a person, so that motor and brake must be off; give them phases of their own");
@@ -90,7 +81,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
   runtime::PhasePermissions permissions{};
   for (const PhasePlan& plan : plans_) {
     runtime::PhasePermission& may = permissions[static_cast<std::size_t>(plan.phase)];
-    may.motor = may.motor || plan.motor_duty > 0.0 || !plan.motor_profile.empty();
+    may.motor = may.motor || !plan.motor_duty.zero();
     may.brake = may.brake || plan.brake != BrakeAction::released;
     may.together = may.together || plan.motor_with_brake;
   }

@@ -23,8 +23,9 @@ namespace abs_hil::experiment {
 /// How a profile continues between two points.
 enum class Between : std::uint8_t { line, hold };
 
-/// A value over the time since its phase began. It interpolates between points in order and stays constant before the
-/// first and after the last. Empty: no profile. `at` is real-time safe; everything else happens before the run.
+/// A value over the time since its phase began: a constant, or points in order between which it interpolates, constant
+/// before the first and after the last. Empty: none is given. `at` is real-time safe; everything else happens before
+/// the run.
 class Profile {
  public:
   struct Point {
@@ -33,6 +34,7 @@ class Profile {
   };
 
   Profile() = default;
+  Profile(double constant) : points_{{0.0, constant}} {}  // NOLINT(google-explicit-constructor): a number is one, too
   /// Throws std::invalid_argument for times that are not finite or decrease, and for values that are not finite. Two
   /// points at the same time make a step: the second value holds from then on.
   explicit Profile(std::vector<Point> points, Between between = Between::line)
@@ -48,10 +50,14 @@ class Profile {
   }
 
   [[nodiscard]] bool empty() const noexcept { return points_.empty(); }
+  [[nodiscard]] bool constant() const noexcept { return points_.size() <= 1; }
+  /// False for a value that may act at some time.
+  [[nodiscard]] bool zero() const noexcept { return constant() && at(0.0) == 0.0; }
   [[nodiscard]] const std::vector<Point>& points() const noexcept { return points_; }
   [[nodiscard]] Between between() const noexcept { return between_; }
-  /// Value at that time; the profile must not be empty.
+  /// Value at that time; 0 if there is none.
   [[nodiscard]] double at(double time_s) const noexcept {
+    if (points_.empty()) return 0.0;
     const auto after = std::upper_bound(points_.begin(), points_.end(), time_s,
                                         [](double time, const Point& point) { return time < point.time_s; });
     if (after == points_.begin()) return after->value;
@@ -81,30 +87,17 @@ struct EndCondition {
 struct PhasePlan {
   rig::Phase phase{rig::Phase::idle};
   std::string name{};  ///< empty: that of `phase`
-  double motor_duty{0.0};
+  Profile motor_duty{};
   BrakeAction brake{BrakeAction::released};
-  double brake_torque_Nm{0.0};  ///< for BrakeAction::torque
-  double brake_duty{0.0};       ///< for BrakeAction::duty
-  // Profiles over the phase's time; those that are not empty replace the constants above.
-  Profile motor_profile{};
-  Profile brake_profile{};     ///< of the torque or the duty
-  Profile slip_ref_profile{};  ///< replaces control.slip_ref
+  Profile brake_torque_Nm{};  ///< for BrakeAction::torque
+  Profile brake_duty{};       ///< for BrakeAction::duty
+  Profile slip_ref{};         ///< for BrakeAction::slip_control; empty: control.slip_ref
   std::vector<EndCondition> ends_on{};
   double time_limit_s{0.0};      ///< in (0, 600]
   bool motor_with_brake{false};  ///< permits motor and brake together in this phase
   bool restart{false};           ///< the slip controller begins anew, although the phase before used it too
   bool wheels_apart{false};      ///< the upper wheel is lifted off the lower one
   std::string question{};        ///< for a person, who does something before the phase ends; empty: none
-
-  [[nodiscard]] double motor_duty_at(double time_s) const noexcept {
-    return motor_profile.empty() ? motor_duty : motor_profile.at(time_s);
-  }
-  [[nodiscard]] double brake_torque_Nm_at(double time_s) const noexcept {
-    return brake_profile.empty() ? brake_torque_Nm : brake_profile.at(time_s);
-  }
-  [[nodiscard]] double brake_duty_at(double time_s) const noexcept {
-    return brake_profile.empty() ? brake_duty : brake_profile.at(time_s);
-  }
 };
 
 /// Limits of a whole run; exceeding one is a fault.

@@ -17,9 +17,6 @@ namespace abs_hil::guardian {
 /// The processes of runs, as a guard sees them. A handle never refers to another process. No call waits.
 class Processes {
  public:
-  Processes() = default;
-  Processes(const Processes&) = delete;
-  Processes& operator=(const Processes&) = delete;
   virtual ~Processes() = default;
 
   /// A handle on a process that this one may end; < 0 if there is none, or if it may not.

@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
@@ -46,30 +47,31 @@ driver::FileDescriptor high_copy(driver::FileDescriptor fd) {
   return high_copy(fd.get());
 }
 
-class SpawnSetUp {
- public:
-  SpawnSetUp() {
-    posix_spawn_file_actions_init(&actions);
-    posix_spawnattr_init(&attributes);
-    sigset_t none;
-    sigset_t all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  }
-  SpawnSetUp(const SpawnSetUp&) = delete;
-  SpawnSetUp& operator=(const SpawnSetUp&) = delete;
-  ~SpawnSetUp() {
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-  }
+/// Starts a program in a session of its own, with default signals and these descriptors only: those here by those
+/// there. Returns 0, or an errno.
+int spawn(pid_t& pid, const std::string& program, std::initializer_list<std::pair<int, int>> files) {
   posix_spawn_file_actions_t actions{};
   posix_spawnattr_t attributes{};
-};
+  posix_spawn_file_actions_init(&actions);
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigset_t all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  for (const auto& [from, to] : files) posix_spawn_file_actions_adddup2(&actions, from, to);
+  posix_spawn_file_actions_addclosefrom_np(&actions, inherited_guard_page + 1);
+  std::string name = program;
+  std::array<char*, 2> arguments{name.data(), nullptr};
+  const int error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  return error;
+}
 
 }  // namespace
 
@@ -205,20 +207,13 @@ void GuardianProcess::start() {
   const auto controller = high_copy(driver::FileDescriptor(open_pidfd(::getpid())));
   const auto launch_config = high_copy(driver::FileDescriptor(text_in_memory(launch_config_)));
 
-  SpawnSetUp set_up;
-  for (const auto& [from, to] : {std::pair(recorder.get(), inherited_recorder),
-                                 {controller.get(), inherited_controller},
-                                 {ready.get(), inherited_ready},
-                                 {launch_config.get(), inherited_launch_config},
-                                 {run_page.get(), inherited_run_page},
-                                 {guard_page.get(), inherited_guard_page}}) {
-    posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
-  }
-  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_guard_page + 1);
-  std::string name = program_;
-  std::array<char*, 2> arguments{name.data(), nullptr};
-  const int error =
-      ::posix_spawn(&pid_, program_.c_str(), &set_up.actions, &set_up.attributes, arguments.data(), environ);
+  const int error = spawn(pid_, program_,
+                          {{recorder.get(), inherited_recorder},
+                           {controller.get(), inherited_controller},
+                           {ready.get(), inherited_ready},
+                           {launch_config.get(), inherited_launch_config},
+                           {run_page.get(), inherited_run_page},
+                           {guard_page.get(), inherited_guard_page}});
   if (error != 0) {
     pid_ = 0;
     refuse_for("cannot start " + program_, error);

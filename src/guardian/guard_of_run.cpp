@@ -12,14 +12,13 @@
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "config/board_policy.hpp"
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
 #include "guardian/guard.hpp"
-#include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
 #include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
-#include "runtime/board_policy.hpp"
 
 namespace abs_hil::guardian {
 
@@ -50,7 +49,7 @@ GuardianSetup set_up() {
                       "the controller's configuration");
   constexpr double emulator_insist_s = 10.0;
   double& insist_s = setup.settings.guardian.insist_s;
-  if (insist_s == 0.0 && !runtime::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
+  if (insist_s == 0.0 && !config::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
   setup.writer = driver::make_safe_state_writer(setup.settings.driver);
   setup.writer->prepare();
   const runtime::RealtimeOptions realtime = realtime_options(setup.settings, setup.launch.realtime);
@@ -70,7 +69,7 @@ int guard() {
   const runtime::RealtimeReport& realtime = setup.realtime->report();
   runtime::MonotonicClock clock;
   LinuxProcesses processes;
-  const runtime::GuardianOptions& options = setup.settings.guardian;
+  const config::GuardianOptions& options = setup.settings.guardian;
   BoardGuard guard({.clock = clock,
                     .board = *setup.writer,
                     .processes = processes,

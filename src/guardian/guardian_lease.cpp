@@ -17,9 +17,9 @@
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "config/board_policy.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
-#include "runtime/board_policy.hpp"
 
 namespace abs_hil::guardian {
 
@@ -70,7 +70,7 @@ std::string plain(const std::string& text) {
 
 /// The end of a namespace's first process ends all others in it, the guardian too, before anybody can write.
 void refuse_own_guardian_of_first_process(const driver::DriverOptions& driver) {
-  if (::getpid() != 1 || (driver.emulated && !runtime::is_real_board(driver))) return;
+  if (::getpid() != 1 || (driver.emulated && !config::is_real_board(driver))) return;
   throw driver::Unavailable(
       "guardian: this program is process 1 of its namespace (a container's entry point): its end would end its own "
       "guardian too, and the board would hold its duties. Use the resident service of the computer: give the container "
@@ -175,9 +175,9 @@ bool needs_guardian(const config::Settings& settings, bool virtual_time) {
 
 std::unique_ptr<GuardianLease> ask_for_lease(const config::Settings& settings, bool virtual_time) {
   if (!needs_guardian(settings, virtual_time)) return nullptr;
-  const runtime::GuardianOptions& options = settings.guardian;
+  const config::GuardianOptions& options = settings.guardian;
   const driver::DriverOptions& driver = settings.driver;
-  const bool wanted = options.resident == "require" || (options.resident == "auto" && runtime::is_real_board(driver));
+  const bool wanted = options.resident == "require" || (options.resident == "auto" && config::is_real_board(driver));
   if (wanted) {
     auto lease = GuardianLease::ask(options.socket, kept_board(driver));
     if (lease) return lease;
@@ -197,7 +197,7 @@ std::string who_guards(const Guard& guard, bool resident, const config::Settings
     return fmt::format("the resident service guards this run (process {}, {})", guard.pid(), settings.guardian.socket);
   }
   std::string text = fmt::format("process {}, which this run started, stands by", guard.pid());
-  if (runtime::is_real_board(settings.driver)) {
+  if (config::is_real_board(settings.driver)) {
     text +=
         "; what ends or stops both at once (a container, a systemd scope, a suspension) leaves the outputs as they "
         "are: the resident service covers that (sudo systemctl enable --now abs-guardian, docs/dead-man.md)";

@@ -181,7 +181,7 @@ class Service {
     if (memory == MAP_FAILED) throw driver::Unavailable(std::string("guardian: no memory: ") + std::strerror(errno));
     page_ = new (memory) ServicePage;
     LinuxProcesses processes;
-    const runtime::GuardianOptions& options = settings_.guardian;
+    const config::GuardianOptions& options = settings_.guardian;
     BoardGuard guard({.clock = clock_,
                       .board = *board,
                       .processes = processes,

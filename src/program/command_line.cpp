@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "config/config_error.hpp"
-#include "files/result_file.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {
@@ -28,6 +27,23 @@ void check_start(const RunRequest& request) {
     refuse(
         "wheels that turn from the beginning would slow down during the wait; leave out experiment.start_speed_rad_s");
   }
+}
+
+void add_output_options(cli::Parser& parser, OutputOptions& o) {
+  parser.add("--csv", &o.csv_file, "write every cycle to a CSV file", {.type = "FILE"});
+  parser.add("--log", &o.log_file, "write an LCM event log (.lcmlog)", {.type = "FILE"});
+  parser.add("--summary", &o.summary_file, "write the summary as JSON", {.type = "FILE"});
+  parser.add("--prior", &o.prior_file,
+             "what the controller learns for the next braking on this rig: read if the file is there, renewed "
+             "after each braking that stops",
+             {.type = "FILE"});
+  parser.add("--recorder", &o.recorder_dir, "folder for the flight record: the last 2 s of a run that ended by a fault",
+             {.type = "DIR"});
+  parser.add("--out", &o.run_folder,
+             "run folder for all of the run's files, new or empty (default: a new one below runs/)", {.type = "DIR"});
+  parser.add("--no-out", &o.no_run_folder, "write no run folder", {.excludes = {"--out"}});
+  parser.add("--lcm-url", &o.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
+  parser.add("--no-lcm", &o.no_lcm, "do not publish on LCM", {.excludes = {"--lcm-url"}});
 }
 
 }  // namespace
@@ -53,6 +69,12 @@ void check_questions(const RunRequest& request) {
         "experiment {}: experiment.answers = itself: on a rig only a person can say that it is done; leave it out",
         request.script->name));
   }
+}
+
+std::unique_ptr<files::ResultFile> open_result(const std::optional<std::string>& path, const std::string& kind) try {
+  return path ? std::make_unique<files::ResultFile>(*path, kind) : nullptr;
+} catch (const std::runtime_error& error) {
+  throw config::ConfigError(error.what());
 }
 
 void keep_inputs(const config::Sources& sources) {
@@ -113,27 +135,6 @@ void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<s
              {.one_of = {"require", "prefer", "off"}});
   parser.add("--histogram", &histogram_file, "write latency histograms in cyclictest's format", {.type = "FILE"});
 }
-
-namespace {
-
-void add_output_options(cli::Parser& parser, OutputOptions& o) {
-  parser.add("--csv", &o.csv_file, "write every cycle to a CSV file", {.type = "FILE"});
-  parser.add("--log", &o.log_file, "write an LCM event log (.lcmlog)", {.type = "FILE"});
-  parser.add("--summary", &o.summary_file, "write the summary as JSON", {.type = "FILE"});
-  parser.add("--prior", &o.prior_file,
-             "what the controller learns for the next braking on this rig: read if the file is there, renewed "
-             "after each braking that stops",
-             {.type = "FILE"});
-  parser.add("--recorder", &o.recorder_dir, "folder for the flight record: the last 2 s of a run that ended by a fault",
-             {.type = "DIR"});
-  parser.add("--out", &o.run_folder,
-             "run folder for all of the run's files, new or empty (default: a new one below runs/)", {.type = "DIR"});
-  parser.add("--no-out", &o.no_run_folder, "write no run folder", {.excludes = {"--out"}});
-  parser.add("--lcm-url", &o.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
-  parser.add("--no-lcm", &o.no_lcm, "do not publish on LCM", {.excludes = {"--lcm-url"}});
-}
-
-}  // namespace
 
 void add_run_options(cli::Parser& parser, RunOptions& o) {
   add_backend_option(parser, o);

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "config/merge.hpp"
+#include "files/result_file.hpp"
 
 namespace abs_hil::program {
 
@@ -50,6 +52,11 @@ struct RunRequest : config::Configuration {
 /// Refuses a run whose questions nobody could answer, or that would move a rig without a person's answer. Throws
 /// config::ConfigError.
 void check_questions(const RunRequest& request);
+
+/// Opens a result before anything moves, so that a bad path is reported at once; null without a path. Throws
+/// config::ConfigError. @param kind  for messages, as "histogram"
+[[nodiscard]] std::unique_ptr<files::ResultFile> open_result(const std::optional<std::string>& path,
+                                                             const std::string& kind);
 
 /// No result of this process may replace a file that these name.
 void keep_inputs(const config::Sources& sources);

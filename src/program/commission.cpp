@@ -14,6 +14,7 @@
 #include <string>
 #include <utility>
 
+#include "config/board_policy.hpp"
 #include "config/config_file.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
@@ -21,7 +22,6 @@
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "runtime/board_policy.hpp"
 
 namespace abs_hil::program {
 
@@ -134,7 +134,7 @@ class GuardedPulse final : public experiment::PulseGuard {
 void keep_record(const config::Settings& settings, const driver::BoardIdentity& board,
                  const experiment::Commissioning& measured, Terminal& terminal) {
   const driver::DriverOptions& options = settings.driver;
-  const bool emulated = !runtime::is_real_board(options);
+  const bool emulated = !config::is_real_board(options);
   if (emulated && options.records.empty()) return;
   experiment::BoardRecord record = experiment::describe_board(options, settings.rig, board, emulated);
   record.outputs = measured.output_times();
@@ -163,7 +163,7 @@ experiment::CommissioningResult go_through(const config::Configuration& configur
       configuration.settings.rig.source));
   GuardedPulse guard(configuration, *driver, lease);
   experiment::CommissioningOptions pulses = options;
-  pulses.emulated = !runtime::is_real_board(driver_options);
+  pulses.emulated = !config::is_real_board(driver_options);
   pulses.encoder_counts_per_rev = driver_options.encoder_counts_per_rev;
   experiment::Commissioning commissioning(*driver, clock, terminal, guard, pulses,
                                           [] { return signalled() != rig::Reason::none; });

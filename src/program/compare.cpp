@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "config/config_error.hpp"
-#include "files/result_file.hpp"
 #include "program/command_line.hpp"
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
@@ -34,13 +33,6 @@ struct CompareOptions {
   std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
   std::optional<std::string> run_folder{};  ///< --out: its folder
 };
-
-/// Opens a result file. Called before the runs, so that a bad path is reported at once.
-std::unique_ptr<files::ResultFile> open(const std::optional<std::string>& path) try {
-  return path ? std::make_unique<files::ResultFile>(*path, "comparison") : nullptr;
-} catch (const std::runtime_error& error) {
-  throw config::ConfigError(error.what());
-}
 
 /// Refuses a file name that is a number: --repeat was meant.
 void refuse_number(const std::optional<std::string>& file) {
@@ -84,10 +76,10 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
        .path = "compare"},
       {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
   if (options.recorded_run) return record(options, study, command_line);
-  auto json = open(options.json_file);
-  auto csv = open(options.csv_file);
-  auto markdown = open(options.markdown_file);
-  auto runs_file = open(options.runs_file);
+  const auto json = open_result(options.json_file, "comparison");
+  const auto csv = open_result(options.csv_file, "comparison");
+  const auto markdown = open_result(options.markdown_file, "comparison");
+  const auto runs_file = open_result(options.runs_file, "comparison");
 
   study::RunsByController runs;
   try {

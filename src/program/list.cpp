@@ -103,50 +103,45 @@ std::string valid_of(const config::Key& key) {
   return text;
 }
 
-/// How the key bears on the safety of a run on a board.
-std::string class_of(const config::Key& key) { return config::safety_of(key).in_words(key.unit); }
-
-/// Calls `visit` with each key of the configuration, which has its default.
-template <class Visit>
-void for_each_key(const Visit& visit) {
+/// Each key of the configuration with its default.
+Json keys() {
   config::Settings settings;
   const config::KeyTable table(settings);
-  std::ranges::for_each(table.keys(), visit);
-}
-
-std::string text_of_value(const config::Key& key) { return config::text_of(config::value_of(key)); }
-
-Json keys() {
   Json rows = Json::array();
-  for_each_key([&rows](const config::Key& key) {
+  for (const config::Key& key : table.keys()) {
     rows.push_back({{"name", key.name},
-                    {"value", text_of_value(key)},
+                    {"value", config::text_of(config::value_of(key))},
                     {"valid", valid_of(key)},
                     {"unit", key.unit},
                     {"meaning", key.meaning},
-                    {"safety", class_of(key)}});
-  });
+                    {"safety", config::safety_of(key).in_words(key.unit)}});
+  }
   return rows;
 }
 
+std::string text_in(const Json& row, const char* column) { return row[column].get<std::string>(); }
+
 void list_keys() {
+  const Json rows = keys();
   std::size_t name_width = 0, value_width = 0;
-  for_each_key([&](const config::Key& key) {
-    name_width = std::max(name_width, key.name.size());
-    value_width = std::max(value_width, text_of_value(key).size());
-  });
-  for_each_key([&](const config::Key& key) {
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", key.name, name_width, text_of_value(key), value_width, valid_of(key),
-               key.unit.empty() ? "" : " ", key.unit, key.meaning,
-               config::safety_of(key).kind != rig::SafetyClass::Kind::none ? fmt::format(" [{}]", class_of(key)) : "");
-  });
+  for (const Json& row : rows) {
+    name_width = std::max(name_width, text_in(row, "name").size());
+    value_width = std::max(value_width, text_in(row, "value").size());
+  }
+  for (const Json& row : rows) {
+    const std::string unit = text_in(row, "unit");
+    const std::string safety = text_in(row, "safety");
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", text_in(row, "name"), name_width, text_in(row, "value"), value_width,
+               text_in(row, "valid"), unit.empty() ? "" : " ", unit, text_in(row, "meaning"),
+               safety != rig::no_effect_on_safety.in_words("") ? fmt::format(" [{}]", safety) : "");
+  }
 }
 
 void list_quantities() {
   fmt::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
   for (const Json& row : quantities()) {
-    fmt::print("{:<24}  {:<15}  {:>3}  {}\n", row["name"].get<std::string>(), row["unit"].get<std::string>(),
-               row["csv_column"].is_null() ? "" : row["csv_column"].dump(), row["meaning"].get<std::string>());
+    fmt::print("{:<24}  {:<15}  {:>3}  {}\n", text_in(row, "name"), text_in(row, "unit"),
+               row["csv_column"].is_null() ? "" : row["csv_column"].dump(), text_in(row, "meaning"));
   }
 }
 

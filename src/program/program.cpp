@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <optional>
 #include <stdexcept>
@@ -23,6 +22,7 @@
 #include "program/subcommands.hpp"
 #include "rig/clean_text.hpp"
 #include "runtime/early_end.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil {
@@ -101,6 +101,8 @@ int checked(int argc, char** argv, std::span<const control::ControllerEntry> own
     return fail(program::exit_usage, error);
   } catch (const std::invalid_argument& error) {
     return fail(program::exit_usage, error);
+  } catch (const telemetry::RecordingError& error) {
+    return fail(program::exit_usage, config::ConfigError(error.what()));  // on one line, whatever its file holds
   } catch (const driver::Unavailable& error) {
     return fail(program::exit_unavailable, error);
   } catch (const telemetry::LcmError& error) {

@@ -59,28 +59,24 @@ int check_again(const replay::RecordedRun& run) {
 
 /// With --check 0 if all commands are bit-equal and 1 if not; 2 for a file that is no recording or is damaged.
 int replay_run(const ReplayCommand& command) {
+  const replay::RecordedRun run = replay::read_run(log_in(command.recording));
+  note(run.cut);
+  if (command.check) return check_again(run);
+  const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
+  std::optional<telemetry::CsvSink> csv;
   try {
-    const replay::RecordedRun run = replay::read_run(log_in(command.recording));
-    note(run.cut);
-    if (command.check) return check_again(run);
-    const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
-    std::optional<telemetry::CsvSink> csv;
-    try {
-      if (command.csv_file) csv.emplace(*command.csv_file, 0, replay::names_of(run, settings));
-    } catch (const files::FileError& error) {
-      throw config::ConfigError(error.what());
-    }
-    const std::vector<replay::RerunCycle> rerun =
-        replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
-    fmt::print("{}", replay::report(run, settings, rerun));
-    if (csv) {
-      for (const replay::RerunCycle& cycle : rerun) csv->consume(cycle.record, cycle.distance_m);
-      csv->finish();
-    }
-    return exit_completed;
-  } catch (const telemetry::RecordingError& error) {
+    if (command.csv_file) csv.emplace(*command.csv_file, 0, replay::names_of(run, settings));
+  } catch (const files::FileError& error) {
     throw config::ConfigError(error.what());
   }
+  const std::vector<replay::RerunCycle> rerun =
+      replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
+  fmt::print("{}", replay::report(run, settings, rerun));
+  if (csv) {
+    for (const replay::RerunCycle& cycle : rerun) csv->consume(cycle.record, cycle.distance_m);
+    csv->finish();
+  }
+  return exit_completed;
 }
 
 int convert(const ConvertCommand& command) {
@@ -93,17 +89,13 @@ int convert(const ConvertCommand& command) {
   if (std::filesystem::path(command.to).extension() != ".csv") {
     throw config::ConfigError("convert: OUT = " + command.to + ": give a name that ends in .csv, .mcap or .parquet");
   }
-  try {
-    const telemetry::ConversionCounts counts = telemetry::log_to_csv(from, command.to);
-    note(counts.cut);
-    if (!counts.lacks.empty()) spdlog::warn("'{}' lacks {}: another version wrote it", from, counts.lacks);
-    fmt::print("{} events", counts.events);
-    if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
-    fmt::print("\n");
-    return exit_completed;
-  } catch (const telemetry::RecordingError& error) {
-    throw config::ConfigError(error.what());
-  }
+  const telemetry::ConversionCounts counts = telemetry::log_to_csv(from, command.to);
+  note(counts.cut);
+  if (!counts.lacks.empty()) spdlog::warn("'{}' lacks {}: another version wrote it", from, counts.lacks);
+  fmt::print("{} events", counts.events);
+  if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
+  fmt::print("\n");
+  return exit_completed;
 }
 
 }  // namespace

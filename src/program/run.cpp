@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "analysis/run_summary.hpp"
+#include "config/board_policy.hpp"
 #include "config/plan.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
@@ -29,7 +30,6 @@
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "run/run_summary.hpp"
-#include "runtime/board_policy.hpp"
 #include "runtime/record_pump.hpp"
 
 namespace abs_hil::program {
@@ -206,30 +206,6 @@ class TimingMessages {
   bool set_up_untold_;
 };
 
-}  // namespace
-
-int status_of(const run::RunOutcome& outcome) {
-  if (outcome.completed()) return exit_completed;
-  return is_signal(outcome.reason) ? status_of(outcome.reason) : exit_ended_early;
-}
-
-std::string realtime_refusal(const runtime::RealtimeReport& report) {
-  return "--rt require (the default on a real board): real-time scheduling is unavailable on this computer; nothing "
-         "has moved. Mend the following; --rt prefer runs without it\n" +
-         report.shortcomings();
-}
-
-runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time) {
-  runtime::OverrunOptions overruns = s.realtime.overruns;
-  if (overruns.cycle_gap_max_s == 0.0 && guardian::needs_guardian(s, virtual_time)) {
-    constexpr double s_per_ms = 1e-3;
-    overruns.cycle_gap_max_s = s.guardian.timeout_ms * s_per_ms;
-  }
-  return overruns;
-}
-
-namespace {
-
 /// Checks in advance, as far as possible, that a guardian can start.
 void require_own_guardian(const driver::DriverOptions& board) {
   static_cast<void>(driver::make_safe_state_writer(board));
@@ -239,25 +215,6 @@ void require_own_guardian(const driver::DriverOptions& board) {
       "guardian: " + program + ": " + std::strerror(errno) +
       ": abs_hil needs its guardian to drive a rig; install abs_guardian in the folder of abs_hil");
 }
-
-}  // namespace
-
-void require_resources(run::Run& run, bool has_lease) {
-  run.driver().configure();
-  const config::Settings& s = run.settings();
-  if (s.on_rig() && runtime::is_real_board(s.driver)) {
-    const std::string note = experiment::require_record(s.driver, s.rig, run.driver().identity());
-    if (!note.empty()) spdlog::warn("{}", note);
-  }
-  if (guardian::needs_guardian(s, !run.real_time()) && !has_lease) require_own_guardian(s.driver);
-  if (!run.real_time() || s.realtime.mode != runtime::RealtimeMode::require) return;
-  runtime::RealtimeReport report;
-  // Uses a thread of its own: its scheduling class disappears with it.
-  std::jthread([&] { report = runtime::RealtimeScope(s.realtime).report(); }).join();
-  if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
-}
-
-namespace {
 
 /// Writes the run's files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
@@ -298,6 +255,41 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
 }
 
 }  // namespace
+
+int status_of(const run::RunOutcome& outcome) {
+  if (outcome.completed()) return exit_completed;
+  return is_signal(outcome.reason) ? status_of(outcome.reason) : exit_ended_early;
+}
+
+std::string realtime_refusal(const runtime::RealtimeReport& report) {
+  return "--rt require (the default on a real board): real-time scheduling is unavailable on this computer; nothing "
+         "has moved. Mend the following; --rt prefer runs without it\n" +
+         report.shortcomings();
+}
+
+runtime::OverrunOptions overruns_of(const config::Settings& s, bool virtual_time) {
+  runtime::OverrunOptions overruns = s.realtime.overruns;
+  if (overruns.cycle_gap_max_s == 0.0 && guardian::needs_guardian(s, virtual_time)) {
+    constexpr double s_per_ms = 1e-3;
+    overruns.cycle_gap_max_s = s.guardian.timeout_ms * s_per_ms;
+  }
+  return overruns;
+}
+
+void require_resources(run::Run& run, bool has_lease) {
+  run.driver().configure();
+  const config::Settings& s = run.settings();
+  if (s.on_rig() && config::is_real_board(s.driver)) {
+    const std::string note = experiment::require_record(s.driver, s.rig, run.driver().identity());
+    if (!note.empty()) spdlog::warn("{}", note);
+  }
+  if (guardian::needs_guardian(s, !run.real_time()) && !has_lease) require_own_guardian(s.driver);
+  if (!run.real_time() || s.realtime.mode != runtime::RealtimeMode::require) return;
+  runtime::RealtimeReport report;
+  // Uses a thread of its own: its scheduling class disappears with it.
+  std::jthread([&] { report = runtime::RealtimeScope(s.realtime).report(); }).join();
+  if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
+}
 
 int run(const RunRequest& request) {
   const config::Settings& s = request.settings;

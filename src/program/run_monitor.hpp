@@ -30,8 +30,6 @@ class RunMonitor {
   RunMonitor(const RunRequest& request, guardian::GuardianLease* lease, std::filesystem::path record_prefix,
              rig::RunNames names = {});
 
-  RunMonitor(const RunMonitor&) = delete;
-  RunMonitor& operator=(const RunMonitor&) = delete;
   /// Ends the guardian unless `end` did: it uses this object's memory.
   ~RunMonitor();
 

@@ -1,6 +1,7 @@
 // Opens a run's CSV, logs, summary and folder before it begins, and completes them at its end.
 #include "program/run_outputs.hpp"
 
+#include <fmt/chrono.h>
 #include <spdlog/spdlog.h>
 
 #include <ctime>
@@ -60,11 +61,9 @@ void RunOutputs::open_folder(const RunRequest& request) {
     // A run in virtual time can be repeated from its command line: it leaves a run folder only if asked.
     const std::filesystem::path runs = run_folder::default_runs_dir();
     if (request.virtual_time || o.no_run_folder || o.names_files() || runs.empty()) return;
-    const std::time_t now = std::time(nullptr);
-    std::tm local{};
-    localtime_r(&now, &local);
     try {
-      folder_.emplace(run_folder::unused_folder(runs, local, request.settings.experiment.name));
+      folder_.emplace(
+          run_folder::unused_folder(runs, fmt::localtime(std::time(nullptr)), request.settings.experiment.name));
     } catch (const run_folder::FolderError& error) {
       // This folder was not asked for, so its failure must not prevent the run.
       spdlog::warn("this run leaves no run folder: {} (--no-out silences this)", error.what());

@@ -1,4 +1,5 @@
 // Runs the members of a series one after the other, with a pause in between, and keeps its folder.
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -115,10 +116,7 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
   } else {
     const std::filesystem::path runs = run_folder::default_runs_dir();
     if (o.no_run_folder || runs.empty()) return folder;
-    const std::time_t now = std::time(nullptr);
-    std::tm local{};
-    localtime_r(&now, &local);
-    path = run_folder::unused_folder(runs, local, base.settings.experiment.name);
+    path = run_folder::unused_folder(runs, fmt::localtime(std::time(nullptr)), base.settings.experiment.name);
   }
   try {
     folder = std::make_unique<run_folder::SeriesFolder>(

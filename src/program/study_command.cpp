@@ -52,24 +52,6 @@ void add_options(StudyCommand& command) {
   add_submit(command.parser, command);
 }
 
-}  // namespace
-
-Action add_study(cli::Parser& parser, const Words& words) {
-  const auto command = std::make_shared<StudyCommand>();
-  command->parser = parser;
-  add_options(*command);
-  return [command, words] { return study(*command, words); };
-}
-
-std::string study_folder(const std::string& file, const std::optional<std::string>& given) {
-  if (given) return *given;
-  const std::filesystem::path runs = run_folder::default_runs_dir();
-  if (runs.empty()) throw config::ConfigError("ABS_HIL_RUNS_DIR is empty; give the folder of the results with --out");
-  return (runs / std::filesystem::path(file).stem()).string();
-}
-
-namespace {
-
 /// "420 ms", "1.6 s", "12 s", "3 min", "5.2 h".
 std::string duration_text(double seconds) {
   if (seconds < 1.0) return fmt::format("{:.0f} ms", 1e3 * seconds);
@@ -171,7 +153,24 @@ int show_status(const std::string& path) {
   return exit_completed;
 }
 
+constexpr auto least_pause = std::chrono::milliseconds(100);
+constexpr double believable_after_s = 2.0;
+
 }  // namespace
+
+Action add_study(cli::Parser& parser, const Words& words) {
+  const auto command = std::make_shared<StudyCommand>();
+  command->parser = parser;
+  add_options(*command);
+  return [command, words] { return study(*command, words); };
+}
+
+std::string study_folder(const std::string& file, const std::optional<std::string>& given) {
+  if (given) return *given;
+  const std::filesystem::path runs = run_folder::default_runs_dir();
+  if (runs.empty()) throw config::ConfigError("ABS_HIL_RUNS_DIR is empty; give the folder of the results with --out");
+  return (runs / std::filesystem::path(file).stem()).string();
+}
 
 int record_run(const study::Study& study, std::uint64_t number, const std::optional<std::string>& folder,
                const std::vector<std::string>& command_line) {
@@ -198,13 +197,6 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
   return record_run(study::make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
                     command.folder, command_line);
 }
-
-namespace {
-
-constexpr auto least_pause = std::chrono::milliseconds(100);
-constexpr double believable_after_s = 2.0;
-
-}  // namespace
 
 RunProgress::RunProgress(std::uint64_t runs) : runs_(runs), terminal_(isatty(STDERR_FILENO) == 1) {
   note_signals(true);

@@ -65,8 +65,6 @@ class RunProgress {
  public:
   /// @param runs  that will be done
   explicit RunProgress(std::uint64_t runs);
-  RunProgress(const RunProgress&) = delete;
-  RunProgress& operator=(const RunProgress&) = delete;
   /// Clears the line.
   ~RunProgress();
   /// @throws Interrupted  after a signal

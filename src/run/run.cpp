@@ -5,7 +5,9 @@
 
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <future>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -111,6 +113,59 @@ experiment::RunLogicParts Prepared::logic_parts(const plant_sim::PlantOptions& p
   return parts;
 }
 
+/// Ends the program with status 1 if one cycle takes 5 s, or in virtual time if all cycles together take 20 s and a
+/// hundred times the time that they simulate: a controller in this process does not return, or is too slow. It counts
+/// its own waking moments of 0.1 s, so that a stopped program or a debugger is no slow cycle.
+class Run::SlowCycleWatch {
+ public:
+  /// @param period_ns  of virtual time; 0: real time, which limits no whole
+  explicit SlowCycleWatch(std::int64_t period_ns) : period_s_(static_cast<double>(period_ns) * 1e-9) {}
+  /// Real-time safe.
+  void cycle_begins() noexcept { inside_.store(true, std::memory_order_relaxed); }
+  void cycle_ended() noexcept {
+    cycles_.store(cycles_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    inside_.store(false, std::memory_order_relaxed);
+  }
+
+ private:
+  void watch(const std::stop_token& stop) {
+    constexpr auto tick = std::chrono::milliseconds(100);
+    constexpr double tick_s = 0.1;
+    constexpr double cycle_max_s = 5.0;
+    constexpr double whole_grace_s = 20.0;
+    constexpr double slowness_max = 100.0;
+    runtime::keep_signals_away();
+    std::uint64_t seen = 0;
+    double same_s = 0.0;
+    double whole_s = 0.0;
+    std::unique_lock lock(mutex_);
+    while (!end_.wait_for(lock, stop, tick, [&stop] { return stop.stop_requested(); })) {
+      const std::uint64_t cycles = cycles_.load(std::memory_order_relaxed);
+      const bool inside = inside_.load(std::memory_order_relaxed);
+      same_s = inside && cycles == seen ? same_s + tick_s : 0.0;
+      if (inside) whole_s += tick_s;
+      seen = cycles;
+      if (same_s > cycle_max_s) {
+        runtime::end_early("fault: a cycle takes more than 5 s: the controller in this program does not return", false);
+      }
+      if (period_s_ > 0.0 && whole_s > whole_grace_s + slowness_max * period_s_ * static_cast<double>(cycles)) {
+        runtime::end_early(
+            "fault: the run takes more than 20 s and 100 times the time that it simulates: its controller is too slow",
+            false);
+      }
+    }
+  }
+
+  double period_s_;
+  std::atomic<std::uint64_t> cycles_{0};
+  std::atomic<bool> inside_{false};
+  std::mutex mutex_{};
+  std::condition_variable_any end_{};
+  std::jthread thread_{[this](const std::stop_token& stop) { watch(stop); }};
+};
+
+Run::~Run() = default;
+
 Run::Run(const Prepared& prepared, const Given& given) : Run(prepared, given, parts_of(prepared, given)) {}
 
 Run::Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts parts)
@@ -195,7 +250,7 @@ RunOutcome Run::run_fast(const Poll& poll, bool own_thread) {
   const std::unique_ptr<driver::RigDriver, void (*)(driver::RigDriver*)> active(
       &driver_, [](driver::RigDriver* driver) { static_cast<void>(driver->deactivate()); });
   const runtime::CycleInThisThread cycle(*this, own_thread);
-  if (watch_slow_cycles_) slow_cycles_.emplace(executive_.period_ns());
+  if (watch_slow_cycles_) slow_cycles_ = std::make_unique<SlowCycleWatch>(executive_.period_ns());
   ran_ = true;
   bool running = true;
   runtime::MonotonicClock wall;
@@ -261,7 +316,7 @@ RunOutcome Run::run_realtime(const Poll& poll) {
     throw;
   }
   ran_ = true;
-  if (watch_slow_cycles_) slow_cycles_.emplace(0);
+  if (watch_slow_cycles_) slow_cycles_ = std::make_unique<SlowCycleWatch>(0);
   go.set_value(true);
   try {
     while (running.load(std::memory_order_acquire)) {

@@ -83,6 +83,7 @@ class Run final : private runtime::Outputs {
   /// options that cannot be used.
   /// @param prepared  must outlive the run
   explicit Run(const Prepared& prepared, const Given& given = {});
+  ~Run() override;
 
   /// These get every record, in this order, in the thread that calls `go`. Before the run.
   void record_into(const std::vector<rig::RecordSink*>& sinks);
@@ -148,6 +149,7 @@ class Run final : private runtime::Outputs {
   [[nodiscard]] RunOutcome outcome() const;
 
  private:
+  class SlowCycleWatch;
   Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts parts);
   RunOutcome run_fast(const Poll& poll, bool own_thread);
   RunOutcome run_realtime(const Poll& poll);
@@ -174,7 +176,7 @@ class Run final : private runtime::Outputs {
   runtime::RealtimeReport realtime_{};
   runtime::RunGuard* guard_{nullptr};
   bool watch_slow_cycles_{false};
-  std::optional<runtime::SlowCycleWatch> slow_cycles_{};
+  std::unique_ptr<SlowCycleWatch> slow_cycles_{};
   std::atomic<bool> made_safe_{false};  ///< `safe_state_` is that of the run's end
   driver::IoResult safe_state_{};
   bool ran_{false};

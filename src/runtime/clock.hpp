@@ -8,9 +8,6 @@ namespace abs_hil::runtime {
 /// Monotonic time in ns, injected so that the same cycle runs in real time, in virtual time and in tests.
 class Clock {
  public:
-  Clock() = default;
-  Clock(const Clock&) = delete;
-  Clock& operator=(const Clock&) = delete;
   virtual ~Clock() = default;
   [[nodiscard]] virtual std::int64_t now_ns() noexcept = 0;
   /// Sleeps until `time_ns` or a little later; returns at once if that time has passed.

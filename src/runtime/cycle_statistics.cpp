@@ -14,13 +14,13 @@ namespace {
 
 constexpr std::uint64_t one = 1;
 
-using Columns = std::array<const LatencyHistogram*, 5>;
+using Columns = CycleStatistics::Parts;
 
 /// Index one past the last bin in use, at least 1.
 std::size_t bins_in_use(const Columns& columns) {
   std::size_t used = 1;
-  for (const LatencyHistogram* column : columns) {
-    const auto greatest = static_cast<std::size_t>(column->max_ns() / rig::ns_per_us);
+  for (const LatencyHistogram& column : columns) {
+    const auto greatest = static_cast<std::size_t>(column.max_ns() / rig::ns_per_us);
     used = std::max(used, std::min(greatest + 1, LatencyHistogram::bins));
   }
   return used;
@@ -29,7 +29,7 @@ std::size_t bins_in_use(const Columns& columns) {
 template <typename Value>
 void append_line(std::string& text, const char* title, int digits, const Columns& columns, Value value) {
   text += title;
-  for (const LatencyHistogram* column : columns) text += fmt::format(" {:0{}}", value(*column), digits);
+  for (const LatencyHistogram& column : columns) text += fmt::format(" {:0{}}", value(column), digits);
   text += '\n';
 }
 
@@ -78,11 +78,9 @@ rig::DurationQuantiles LatencyHistogram::summary() const noexcept {
 }
 
 void CycleStatistics::add(const rig::CycleTiming& timing) noexcept {
-  wakeup_latency_.add(timing.wakeup_latency_ns);
-  read_.add(timing.read_ns);
-  control_.add(timing.control_ns);
-  write_.add(timing.write_ns);
-  cycle_time_.add(timing.cycle_ns);
+  const std::array durations_ns{timing.wakeup_latency_ns, timing.read_ns, timing.control_ns, timing.write_ns,
+                                timing.cycle_ns};
+  for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].add(durations_ns[i]);
 }
 
 std::uint64_t CycleStatistics::count_overrun(rig::OverrunCause cause, std::uint64_t ticks_missed) noexcept {
@@ -105,25 +103,23 @@ rig::OverrunCounts CycleStatistics::overruns() const noexcept {
 }
 
 rig::TimingSummary CycleStatistics::summary() const noexcept {
-  return {.wakeup_latency = wakeup_latency_.summary(),
-          .read = read_.summary(),
-          .control = control_.summary(),
-          .write = write_.summary(),
-          .cycle_time = cycle_time_.summary(),
+  return {.wakeup_latency = parts_[0].summary(),
+          .read = parts_[1].summary(),
+          .control = parts_[2].summary(),
+          .write = parts_[3].summary(),
+          .cycle_time = parts_[4].summary(),
           .overruns = overruns()};
 }
 
 std::string cyclictest_histogram(const CycleStatistics& statistics) {
-  const Columns columns{&statistics.wakeup_latency(), &statistics.read(), &statistics.control(), &statistics.write(),
-                        &statistics.cycle_time()};
+  const Columns& columns = statistics.parts();
   std::string text =
       "# abs_hil, us; columns: wake-up latency, read, control, write, whole cycle\n"
       "# Histogram\n";
   const std::size_t used = bins_in_use(columns);
   for (std::size_t bin = 0; bin < used; ++bin) {
-    text +=
-        fmt::format("{:06} {:06}\t{:06}\t{:06}\t{:06}\t{:06}\n", bin, columns[0]->in_bin(bin), columns[1]->in_bin(bin),
-                    columns[2]->in_bin(bin), columns[3]->in_bin(bin), columns[4]->in_bin(bin));
+    text += fmt::format("{:06} {:06}\t{:06}\t{:06}\t{:06}\t{:06}\n", bin, columns[0].in_bin(bin),
+                        columns[1].in_bin(bin), columns[2].in_bin(bin), columns[3].in_bin(bin), columns[4].in_bin(bin));
   }
   using Histogram = const LatencyHistogram&;
   const auto us = [](std::int64_t ns) { return static_cast<std::uint64_t>(ns / rig::ns_per_us); };

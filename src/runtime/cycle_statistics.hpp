@@ -64,11 +64,9 @@ class CycleStatistics {
   [[nodiscard]] rig::OverrunCounts overruns() const noexcept;
   [[nodiscard]] rig::TimingSummary summary() const noexcept;
 
-  [[nodiscard]] const LatencyHistogram& wakeup_latency() const noexcept { return wakeup_latency_; }
-  [[nodiscard]] const LatencyHistogram& read() const noexcept { return read_; }
-  [[nodiscard]] const LatencyHistogram& control() const noexcept { return control_; }
-  [[nodiscard]] const LatencyHistogram& write() const noexcept { return write_; }
-  [[nodiscard]] const LatencyHistogram& cycle_time() const noexcept { return cycle_time_; }
+  /// Of wake-up latency, reading, control, writing and the whole cycle.
+  using Parts = std::array<LatencyHistogram, 5>;
+  [[nodiscard]] const Parts& parts() const noexcept { return parts_; }
 
  private:
   std::atomic<std::uint64_t> cycles_{0};
@@ -77,11 +75,7 @@ class CycleStatistics {
   std::atomic<std::uint64_t> ticks_missed_{0};
   std::atomic<std::uint64_t> longest_run_{0};
   std::uint64_t run_{0};  ///< late cycles in a row; only the adding thread uses it
-  LatencyHistogram wakeup_latency_{};
-  LatencyHistogram read_{};
-  LatencyHistogram control_{};
-  LatencyHistogram write_{};
-  LatencyHistogram cycle_time_{};
+  Parts parts_{};
 };
 
 /// The histograms as text in the format of `cyclictest --histogram`, which cyclictest's plotting scripts read. There is

@@ -21,9 +21,6 @@ using RecordRing = SpscRing<rig::CycleRecord>;
 /// real-time thread: no allocation, lock, system call, exception or log call.
 class CycleLogic {
  public:
-  CycleLogic() = default;
-  CycleLogic(const CycleLogic&) = delete;
-  CycleLogic& operator=(const CycleLogic&) = delete;
   virtual ~CycleLogic() = default;
 
   /// Tells, before `step`, whether the checks of the wheels are free of doubt about the measurement. While they doubt

@@ -11,13 +11,11 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
+#include <atomic>
 #include <csignal>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
-#include <string_view>
-
-#include "runtime/realtime_setup.hpp"
 
 namespace abs_hil::runtime {
 
@@ -47,7 +45,9 @@ std::atomic_flag ending;
   while (true) ::poll(nullptr, 0, 1000);
 }
 
-[[noreturn]] void end_early(std::string_view why, bool make_safe) noexcept {
+}  // namespace
+
+void end_early(std::string_view why, bool make_safe) noexcept {
   const pid_t own = own_process.load();  // 0: nobody watches
   if (own != 0 && own != ::getpid()) end_program(1);
   if (ending.test_and_set()) wait_for_the_end();
@@ -64,6 +64,8 @@ std::atomic_flag ending;
   say({text.data(), std::min(end.size, text.size())});
   end_program(1);
 }
+
+namespace {
 
 void on_exit() noexcept {
   if (watched.load()) {
@@ -118,12 +120,6 @@ void catch_system_call() noexcept {
   static_cast<void>(::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_SPEC_ALLOW, &program));
 }
 
-constexpr auto tick = std::chrono::milliseconds(100);
-constexpr double tick_s = 0.1;
-constexpr double cycle_max_s = 5.0;
-constexpr double whole_grace_s = 20.0;
-constexpr double slowness_max = 100.0;
-
 }  // namespace
 
 }  // namespace abs_hil::runtime
@@ -159,29 +155,6 @@ CycleInThisThread::CycleInThisThread(Outputs& outputs, bool own_thread) noexcept
 CycleInThisThread::~CycleInThisThread() {
   running = nullptr;
   of_this_thread = before_;
-}
-
-void SlowCycleWatch::watch() {
-  keep_signals_away();
-  std::uint64_t seen = 0;
-  double same_s = 0.0;
-  double whole_s = 0.0;
-  std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, tick, [this] { return ending_; })) {
-    const std::uint64_t cycles = cycles_.load(std::memory_order_relaxed);
-    const bool inside = inside_.load(std::memory_order_relaxed);
-    same_s = inside && cycles == seen ? same_s + tick_s : 0.0;
-    if (inside) whole_s += tick_s;
-    seen = cycles;
-    if (same_s > cycle_max_s) {
-      end_early("fault: a cycle takes more than 5 s: the controller in this program does not return", false);
-    }
-    if (period_s_ > 0.0 && whole_s > whole_grace_s + slowness_max * period_s_ * static_cast<double>(cycles)) {
-      end_early(
-          "fault: the run takes more than 20 s and 100 times the time that it simulates: its controller is too slow",
-          false);
-    }
-  }
 }
 
 }  // namespace abs_hil::runtime

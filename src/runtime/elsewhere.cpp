@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <string>
 #include <thread>
 
 #include "runtime/clock.hpp"
@@ -41,23 +42,9 @@ EarlyEndWatch::~EarlyEndWatch() = default;
 CycleInThisThread::CycleInThisThread(Outputs& outputs, bool /*own_thread*/) noexcept : before_(&outputs) {}
 CycleInThisThread::~CycleInThisThread() = default;
 
-void SlowCycleWatch::watch() {
-  constexpr auto tick = std::chrono::milliseconds(100);
-  constexpr int ticks_max = 50;
-  std::uint64_t seen = 0;
-  int same = 0;
-  std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, tick, [this] { return ending_; })) {
-    const std::uint64_t cycles = cycles_.load(std::memory_order_relaxed);
-    same = inside_.load(std::memory_order_relaxed) && cycles == seen ? same + 1 : 0;
-    seen = cycles;
-    if (same <= ticks_max) continue;
-    std::fputs(
-        "abs_hil: fault: a cycle takes more than 5 s: the controller in this program does not return; the program "
-        "ends with status 1.\n",
-        stderr);
-    std::_Exit(1);
-  }
+void end_early(std::string_view why, bool /*make_safe*/) noexcept {
+  std::fprintf(stderr, "abs_hil: %s; the program ends with status 1.\n", std::string(why).c_str());
+  std::_Exit(1);
 }
 
 }  // namespace abs_hil::runtime

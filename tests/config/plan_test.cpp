@@ -31,11 +31,11 @@ TEST_CASE("the paper's script gives the plan that C++ code gave before") {
   config::Settings s;
   const Plan whole = plan(*find("paper"), s);
   CHECK(names_of(whole) == std::vector<std::string>{"idle", "accelerate", "coast", "brake", "hold", "stopped"});
-  CHECK(whole.phases[1].motor_duty == 1.0);
+  CHECK(whole.phases[1].motor_duty.at(0.0) == 1.0);
   REQUIRE(whole.phases[1].ends_on.size() == 1);
   CHECK(whole.phases[1].ends_on[0].value == 170.0);
   CHECK(whole.phases[0].time_limit_s == 1.05);
-  CHECK(whole.phases[4].brake_torque_Nm == 2.0);
+  CHECK(whole.phases[4].brake_torque_Nm.at(0.0) == 2.0);
   s.experiment.cut = "peak";
   CHECK(plan(*find("paper"), s).phases[1].ends_on[0].kind == EndKind::upper_wheel_peak);
   s.experiment.start_speed_rad_s = 100.0;
@@ -51,7 +51,7 @@ TEST_CASE("slip control always ends at the least speed for it, whatever the scri
   CHECK(last.value == 0.7);
   CHECK(last.reason == rig::Reason::slip_control_left_at_low_speed);
   CHECK(made.phases[0].phase == rig::Phase::brake);
-  CHECK(made.phases[0].slip_ref_profile.at(1.0) == 0.2);
+  CHECK(made.phases[0].slip_ref.at(1.0) == 0.2);
 }
 
 TEST_CASE("a phase that ends above the least speed gets no second condition") {

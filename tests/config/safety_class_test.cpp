@@ -6,8 +6,7 @@
 
 #include "abs_hil/rig/option_check.hpp"
 #include "catch.hpp"
-#include "config/key_table.hpp"
-#include "runtime/board_policy.hpp"
+#include "config/board_policy.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;
@@ -24,8 +23,7 @@ std::string refusal(const std::string& assignment, const std::string& consent = 
   keys.set_text(assignment, "test");
   if (!consent.empty()) keys.set_text(consent, "test");
   try {
-    static_cast<void>(runtime::refuse_unsafe_use(
-        {.driver = s.driver, .rate_Hz = 1000.0, .unsafe = s.unsafe, .weak = config::weak_values(keys)}));
+    static_cast<void>(config::refuse_unsafe_use(s, keys, false));
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
@@ -58,7 +56,10 @@ TEST_CASE("every key of the tables that protect a board has a class in its row")
 TEST_CASE("no default weakens the protection") {
   config::Settings s;
   const config::KeyTable keys(s);
-  for (const runtime::WeakValue& weak : config::weak_values(keys)) FAIL_CHECK(weak.key << " = " << weak.value);
+  for (const config::Key& key : keys.keys()) {
+    INFO(key.name);
+    CHECK_FALSE(std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target));
+  }
 }
 
 TEST_CASE("keys that once switched a protection off without a word need a person's consent on a board") {

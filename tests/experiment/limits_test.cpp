@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "catch.hpp"
+#include "config/board_policy.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "injected_run.hpp"
-#include "runtime/board_policy.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::experiment;
@@ -115,13 +115,8 @@ bool acts_here(const std::string& name) {
 }
 
 bool refused_on_a_board(const config::Settings& s, const config::KeyTable& keys) {
-  runtime::BoardUse use{.driver = s.driver, .rate_Hz = s.control.rate_Hz, .unsafe = s.unsafe};
-  use.start_speed_rad_s = s.experiment.start_speed_rad_s;
-  use.weak = config::weak_values(keys);
-  use.model_counts_per_rev = s.model.encoder_counts_per_rev;
-  use.rig_counts_per_rev = s.rig.parameters.encoder_counts_per_rev;
   try {
-    static_cast<void>(runtime::refuse_unsafe_use(use));
+    static_cast<void>(config::refuse_unsafe_use(s, keys, false));
   } catch (const std::invalid_argument&) {
     return true;
   }

@@ -67,14 +67,14 @@ TEST_CASE("phases follow one another in the cycle in which a condition holds for
   const auto first = sequence.update(at(0.0));
   CHECK(first.entered);
   CHECK(first.reason == Reason::run_started);
-  CHECK(sequence.current().motor_duty == 0.8);
+  CHECK(sequence.current().motor_duty.at(0.0) == 0.8);
   CHECK_FALSE(sequence.update(at(1.0, 99.9)).entered);
   CHECK_FALSE(sequence.update(at(1.1, 100.0)).entered);
   const auto second = sequence.update(at(1.101, 100.0));
   CHECK(second.entered);
   CHECK(second.reason == Reason::speed_threshold_reached);
   CHECK(sequence.current().phase == Phase::brake);
-  CHECK(sequence.current().motor_duty == 0.0);
+  CHECK(sequence.current().motor_duty.at(0.0) == 0.0);
   CHECK_FALSE(sequence.finished());
   const auto end = sequence.update(at(2.2));
   CHECK(end.reason == Reason::sequence_complete);
@@ -91,7 +91,7 @@ TEST_CASE("exceeding a time limit is a fault with the phase's duration as value"
   CHECK(end.reason == Reason::phase_time_limit);
   CHECK_THAT(end.value, Catch::Matchers::WithinAbs(5.01, 1e-12));
   CHECK(sequence.current().phase == Phase::fault);
-  CHECK(sequence.current().motor_duty == 0.0);
+  CHECK(sequence.current().motor_duty.at(0.0) == 0.0);
   CHECK(sequence.finished());
 }
 
@@ -141,7 +141,7 @@ TEST_CASE(
     CHECK(end.reason == ends_by);
     CHECK(end.value == value);
     CHECK(sequence.current().phase == phase);
-    CHECK(sequence.current().motor_duty == 0.0);
+    CHECK(sequence.current().motor_duty.at(0.0) == 0.0);
     CHECK(sequence.finished());
   }
 }
@@ -167,8 +167,8 @@ TEST_CASE(
     CHECK(begun.entered);
     CHECK(begun.reason == Reason::interrupt_signal);
     CHECK(sequence.current().phase == Phase::hold);
-    CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
-    CHECK(sequence.current().brake_duty_at(0.0) == 0.6);
+    CHECK(sequence.current().motor_duty.at(0.0) == 0.0);
+    CHECK(sequence.current().brake_duty.at(0.0) == 0.6);
     sequence.latch.latch(Reason::terminate_signal, 0.0);  // a repeated request
     CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
     CHECK_FALSE(sequence.finished());
@@ -277,8 +277,8 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
     CHECK(begun.reason == Reason::encoder_upper_stuck);
     CHECK(begun.value == 7.0);
     CHECK(sequence.current().phase == Phase::fault);
-    CHECK(sequence.current().brake_duty_at(0.0) == 0.4);
-    CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
+    CHECK(sequence.current().brake_duty.at(0.0) == 0.4);
+    CHECK(sequence.current().motor_duty.at(0.0) == 0.0);
     CHECK_FALSE(sequence.finished());
     sequence.latch.latch(Reason::encoder_upper_stuck, 7.0);  // told in each cycle
     sequence.latch.latch(Reason::interrupt_signal, 0.0);
@@ -315,7 +315,7 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
   CHECK(late.update(at(5.1, 50.0)).reason == Reason::phase_time_limit);
   CHECK_FALSE(late.finished());
   CHECK(late.current().phase == Phase::fault);
-  CHECK(late.current().brake_duty_at(0.0) == 0.4);
+  CHECK(late.current().brake_duty.at(0.0) == 0.4);
   CHECK_THROWS_WITH(failing({.duty = 1.2}, Reason::none), Catch::Matchers::Contains("after a fault: brake duty"));
 }
 

@@ -30,10 +30,9 @@ void use(const config::Script& script) {
         {.time_s = i * 0.1, .speeds = {i * 10.0, i * 10.0}, .car_speed_m_s = i * 1.0, .distance_m = i * 0.5}, latch);
     const experiment::PhasePlan& now = sequence.current();
     const double time_s = sequence.phase_time_s();
-    expect(now.motor_duty_at(time_s) >= 0.0 && now.motor_duty_at(time_s) <= 1.0);
-    expect(std::isfinite(now.brake_torque_Nm_at(time_s)) && std::isfinite(now.brake_duty_at(time_s)));
-    if (!now.slip_ref_profile.empty())
-      expect(now.slip_ref_profile.at(time_s) > 0.0 && now.slip_ref_profile.at(time_s) < 1.0);
+    expect(now.motor_duty.at(time_s) >= 0.0 && now.motor_duty.at(time_s) <= 1.0);
+    expect(std::isfinite(now.brake_torque_Nm.at(time_s)) && std::isfinite(now.brake_duty.at(time_s)));
+    if (!now.slip_ref.empty()) expect(now.slip_ref.at(time_s) > 0.0 && now.slip_ref.at(time_s) < 1.0);
   }
 }
 

@@ -1,6 +1,4 @@
 // The flight recorder: order, torn records, a writer that dies.
-#include "runtime/flight_ring.hpp"
-
 #include <atomic>
 #include <thread>
 #include <vector>

@@ -83,7 +83,7 @@ struct FileEndings {
 };
 
 /// How an option bears on the safety of a run on a real board. Values that weaken the protection need the consent of a
-/// person there (runtime/board_policy.hpp); `abs_hil list --keys` shows all classes.
+/// person there (config/board_policy.hpp); `abs_hil list --keys` shows all classes.
 struct SafetyClass {
   enum class Kind : std::uint8_t {
     unclassed,     ///< nobody has judged the option

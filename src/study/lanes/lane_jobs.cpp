@@ -48,12 +48,12 @@ bool plan_sequence(const config::Plan& plan, const config::Settings& settings, L
   const experiment::PhasePlan& brake = plan.phases[0];
   const experiment::PhasePlan& hold = plan.phases[1];
   const auto drives = [](const experiment::PhasePlan& phase) {
-    return phase.motor_duty > 0.0 || !phase.motor_profile.empty() || phase.wheels_apart || !phase.question.empty();
+    return !phase.motor_duty.zero() || phase.wheels_apart || !phase.question.empty();
   };
   if (drives(brake) || drives(hold)) return false;
-  if (brake.phase != rig::Phase::brake || brake.brake != BrakeAction::slip_control || !brake.slip_ref_profile.empty())
+  if (brake.phase != rig::Phase::brake || brake.brake != BrakeAction::slip_control || !brake.slip_ref.empty())
     return false;
-  if (hold.phase == rig::Phase::brake || !hold.brake_profile.empty() ||
+  if (hold.phase == rig::Phase::brake || !hold.brake_torque_Nm.constant() ||
       (hold.brake != BrakeAction::torque && hold.brake != BrakeAction::released))
     return false;
   for (const experiment::EndCondition& end : brake.ends_on) {
@@ -66,7 +66,7 @@ bool plan_sequence(const config::Plan& plan, const config::Settings& settings, L
   sequence.brake_limit_s = brake.time_limit_s;
   sequence.hold_limit_s = hold.time_limit_s;
   sequence.run_limit_s = plan.limits.run_time_s;
-  sequence.hold_torque_Nm = hold.brake == BrakeAction::torque ? hold.brake_torque_Nm : 0.0;
+  sequence.hold_torque_Nm = hold.brake == BrakeAction::torque ? hold.brake_torque_Nm.at(0.0) : 0.0;
   // The first cycle must not be slow: two slow ones in a row end slip control.
   return settings.model.wheels.r2_m * settings.experiment.start_speed_rad_s > sequence.slow_m_s;
 }

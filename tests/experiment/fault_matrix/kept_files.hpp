@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "abs_hil/rig/cycle_record.hpp"
-#include "runtime/flight_ring.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::experiment::test {
 

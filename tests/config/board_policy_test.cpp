@@ -1,7 +1,8 @@
 // What the safety policy allows a run on hardware, and what it says otherwise.
-#include "runtime/board_policy.hpp"
+#include "config/board_policy.hpp"
 
 #include <filesystem>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
 
@@ -17,38 +18,28 @@ driver::pci::PciOptions& pci(driver::DriverOptions& driver) { return driver.boar
 driver::can::CanOptions& can(driver::DriverOptions& driver) { return driver.boards.of<driver::can::CanOptions>(); }
 driver::usb::UsbOptions& usb(driver::DriverOptions& driver) { return driver.boards.of<driver::usb::UsbOptions>(); }
 
-/// What a run wants of a board, and the policy's answer: empty if it is allowed.
+/// The settings of a run on a board, and the policy's answer: empty if it is allowed.
 struct Asked {
-  driver::DriverOptions driver{};
-  bool guarded{true};
-  bool virtual_time{false};
-  double start_speed_rad_s{0.0};
-  std::string inject{};
-  double rate_Hz{1000.0};
-  double guardian_timeout_ms{20.0};
-  std::vector<runtime::WeakValue> weak{};
-  int model_counts_per_rev{0};
-  runtime::UnsafeOptions unsafe{};
-  mutable std::vector<std::string> accepted{};
+  explicit Asked(std::initializer_list<const char*> assignments = {}) {
+    s.backend = "rig";
+    keys.leave_out_plant();
+    for (const char* assignment : assignments) keys.set_text(assignment, "test");
+  }
 
-  [[nodiscard]] std::string refusal() const {
+  [[nodiscard]] std::string refusal() {
     try {
-      accepted = runtime::refuse_unsafe_use({.driver = driver,
-                                             .guarded = guarded,
-                                             .virtual_time = virtual_time,
-                                             .rate_Hz = rate_Hz,
-                                             .guardian_timeout_ms = guardian_timeout_ms,
-                                             .unsafe = unsafe,
-                                             .start_speed_rad_s = start_speed_rad_s,
-                                             .injections = driver::parse_injections(inject),
-                                             .weak = weak,
-                                             .model_counts_per_rev = model_counts_per_rev,
-                                             .rig_counts_per_rev = 4096});
+      accepted = config::refuse_unsafe_use(s, keys, virtual_time);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
     return {};
   }
+
+  config::Settings s{};
+  config::KeyTable keys{s};
+  driver::DriverOptions& driver{s.driver};
+  bool virtual_time{false};
+  std::vector<std::string> accepted{};
 };
 
 /// A network interface of this computer with a device behind it; empty if it has none.
@@ -62,7 +53,7 @@ std::string an_adapter() {
 }  // namespace
 
 TEST_CASE("Hardware is not driven without a guardian, even where it is called an emulator") {
-  Asked run{.guarded = false};
+  Asked run{"guardian.enabled=false"};
   CHECK_THAT(run.refusal(), Contains("--set driver.emulated=true"));
   run.driver.emulated = true;
   run.driver.kind = "pci";
@@ -79,34 +70,34 @@ TEST_CASE("A board is real unless its files, its interface or the configuration 
   driver::DriverOptions board;
   board.kind = "pci";
   pci(board).root = "/sys/bus/pci/devices";
-  CHECK(runtime::is_real_board(board));
+  CHECK(config::is_real_board(board));
   board.emulated = true;  // the kernel's cards are real whatever the configuration says
-  CHECK(runtime::is_real_board(board));
+  CHECK(config::is_real_board(board));
   board.emulated = false;
   pci(board).root = "/tmp/emulated/pci";
-  CHECK_FALSE(runtime::is_real_board(board));
+  CHECK_FALSE(config::is_real_board(board));
 
   board.kind = "can";
   can(board).interface = "unix:/tmp/bus";
-  CHECK_FALSE(runtime::is_real_board(board));
+  CHECK_FALSE(config::is_real_board(board));
   can(board).interface = "an-interface-that-is-not-there";
-  CHECK(runtime::is_real_board(board));
+  CHECK(config::is_real_board(board));
   board.emulated = true;
-  CHECK_FALSE(runtime::is_real_board(board));
+  CHECK_FALSE(config::is_real_board(board));
   board.emulated = false;
   if (const std::string adapter = an_adapter(); !adapter.empty()) {
     can(board).interface = adapter;
-    CHECK(runtime::is_real_board(board));
+    CHECK(config::is_real_board(board));
   }
 
   board.kind = "usb";
-  CHECK(runtime::is_real_board(board));
+  CHECK(config::is_real_board(board));
   board.emulated = true;
-  CHECK_FALSE(runtime::is_real_board(board));
+  CHECK_FALSE(config::is_real_board(board));
 }
 
 TEST_CASE("An adapter to a real bus is hardware") {
-  Asked run{.guarded = false};
+  Asked run{"guardian.enabled=false"};
   run.driver.emulated = true;
   run.driver.kind = "can";
   can(run.driver).interface = an_adapter();
@@ -115,12 +106,12 @@ TEST_CASE("An adapter to a real bus is hardware") {
     return;
   }
   CHECK_THAT(run.refusal(), Contains("driver.can.interface = ") && Contains("is real hardware"));
-  run.guarded = true;
+  run.s.guardian.enabled = true;
   CHECK(run.refusal().empty());
 }
 
 TEST_CASE("Faults are injected into emulators alone") {
-  Asked run{.inject = "brake@encoder_upper:stuck"};
+  Asked run{"run.inject=brake@encoder_upper:stuck"};
   CHECK_THAT(run.refusal(), Contains("--inject") && Contains("never injected into real hardware"));
   run.driver.emulated = true;
   run.driver.kind = "pci";
@@ -140,114 +131,128 @@ TEST_CASE("Faults are injected into emulators alone") {
 }
 
 TEST_CASE("Hardware runs in real time, from standstill, and waits no longer than a period") {
-  Asked run{.virtual_time = true};
+  Asked run;
+  run.virtual_time = true;
   CHECK_THAT(run.refusal(), Contains("--fast"));
   run.driver.emulated = true;
   CHECK(run.refusal().empty());
-  run = {.start_speed_rad_s = 170.0};
-  CHECK_THAT(run.refusal(), Contains("experiment.start_speed_rad_s"));
-  run = {};
-  run.driver.kind = "usb";
-  usb(run.driver).answer_timeout_us = 1000;
-  CHECK_THAT(run.refusal(), Contains("driver.usb.answer_timeout_us = 1000") && Contains("1000"));
-  usb(run.driver).answer_timeout_us = 999;
-  CHECK(run.refusal().empty());
+  CHECK_THAT(Asked{"experiment.start_speed_rad_s=170"}.refusal(), Contains("experiment.start_speed_rad_s"));
+  Asked slow{"driver.kind=usb", "driver.usb.answer_timeout_us=1000"};
+  CHECK_THAT(slow.refusal(), Contains("driver.usb.answer_timeout_us = 1000") && Contains("1000"));
+  usb(slow.driver).answer_timeout_us = 999;
+  CHECK(slow.refusal().empty());
 }
 
 TEST_CASE("The gate's duty caps never exceed the board's") {
-  for (const char* kind : {"pci", "can", "usb"}) {
-    driver::DriverOptions driver{.kind = kind};
-    pci(driver).brake_duty_max = can(driver).brake_duty_max = usb(driver).brake_duty_max = 0.7;
-    pci(driver).motor_duty_max = can(driver).motor_duty_max = usb(driver).motor_duty_max = 0.9;
-    CHECK_NOTHROW(runtime::refuse_caps_above_board({.brake = 0.7, .motor = 0.9}, driver));
-    CHECK_THROWS_WITH(runtime::refuse_caps_above_board({.brake = 0.71}, driver),
-                      Contains("gate.brake_duty_max = 0.71") && Contains(std::string("driver.") + kind));
-    CHECK_THROWS_WITH(runtime::refuse_caps_above_board({.motor = 0.91}, driver), Contains("gate.motor_duty_max"));
-    rig::RigParameters rig;
-    rig.encoder_counts_per_rev = 1024;
-    runtime::GateOptions gate;
-    runtime::apply_board_limits(rig, 500.0, gate, driver);
-    CHECK(gate.brake_duty_max == 0.7);
-    CHECK(gate.motor_duty_max == 0.9);
-    CHECK(driver.encoder_counts_per_rev == 1024);
-    CHECK(driver.rate_Hz == 500.0);
+  for (const std::string kind : {"pci", "can", "usb"}) {
+    const auto board = [&kind](Asked& run) {
+      run.driver.kind = kind;
+      pci(run.driver).brake_duty_max = can(run.driver).brake_duty_max = usb(run.driver).brake_duty_max = 0.7;
+      pci(run.driver).motor_duty_max = can(run.driver).motor_duty_max = usb(run.driver).motor_duty_max = 0.9;
+    };
+    Asked brake{"gate.brake_duty_max=0.71"};
+    board(brake);
+    CHECK_THROWS_WITH(config::apply_board_limits(brake.s, brake.keys),
+                      Contains("gate.brake_duty_max = 0.71") && Contains("driver." + kind));
+    Asked motor{"gate.motor_duty_max=0.91"};
+    board(motor);
+    CHECK_THROWS_WITH(config::apply_board_limits(motor.s, motor.keys), Contains("gate.motor_duty_max"));
+    Asked both{"gate.brake_duty_max=0.7", "gate.motor_duty_max=0.9"};
+    board(both);
+    CHECK_NOTHROW(config::apply_board_limits(both.s, both.keys));
+    Asked run{"rig.encoder_counts_per_rev=1024", "control.rate_Hz=500"};
+    board(run);
+    config::apply_board_limits(run.s, run.keys);
+    CHECK(run.s.gate.brake_duty_max == 0.7);
+    CHECK(run.s.gate.motor_duty_max == 0.9);
+    CHECK(run.driver.encoder_counts_per_rev == 1024);
+    CHECK(run.driver.rate_Hz == 500.0);
   }
 }
 
 TEST_CASE("A board without duty caps is not driven") {
-  const driver::DriverOptions driver{.kind = "unheard-of"};
-  CHECK_THROWS_WITH(runtime::refuse_caps_above_board({}, driver), Contains("driver.kind = unheard-of"));
+  Asked run;
+  run.driver.kind = "unheard-of";
+  CHECK_THROWS_WITH(config::apply_board_limits(run.s, run.keys), Contains("driver.kind = unheard-of"));
 }
 
 TEST_CASE("A guardian that would end a healthy run is refused on every board") {
-  Asked run{.rate_Hz = 100.0, .guardian_timeout_ms = 19.9};
+  Asked run{"control.rate_Hz=100", "guardian.timeout_ms=19.9"};
   pci(run.driver).root = "/tmp";
   CHECK_THAT(run.refusal(), Contains("guardian.timeout_ms = 19.9") && Contains("two periods, 20 ms"));
-  run.guardian_timeout_ms = 20.0;
+  run.s.guardian.timeout_ms = 20.0;
   CHECK(run.refusal().empty());
-  run.guardian_timeout_ms = 2.0;
+  run.s.guardian.timeout_ms = 2.0;
   run.virtual_time = true;  // has no guardian
   run.driver.emulated = true;
   CHECK(run.refusal().empty());
 }
 
 TEST_CASE("A weak value on hardware needs a person's consent, and is told; an emulator takes it") {
-  const runtime::WeakValue insist{.key = "guardian.insist_s",
-                                  .value = "0.001",
-                                  .class_text = "weakens unless 0 s",
-                                  .meaning = "how long the guardian tries"};
-  Asked run{.weak = {insist}};
+  Asked run{"guardian.insist_s=0.001"};
   CHECK_THAT(run.refusal(), Contains("guardian.insist_s = 0.001") && Contains("weakens unless 0 s") &&
                                 Contains("--set unsafe.keys=guardian.insist_s"));
-  run.unsafe.blind_control = true;  // another consent
+  run.s.unsafe.blind_control = true;  // another consent
   CHECK_FALSE(run.refusal().empty());
-  run.unsafe = {.keys = "gate.overspeed_rad_s,guardian.insist_s"};
+  run.s.unsafe = {.keys = "gate.overspeed_rad_s,guardian.insist_s"};
   CHECK(run.refusal().empty());
   CHECK(run.accepted.size() == 1);
   CHECK_THAT(run.accepted.at(0), Contains("guardian.insist_s = 0.001 weakens the protection"));
-  run.unsafe.keys = "guardian.insist_s_and_more,guardian.insist";
-  CHECK_FALSE(run.refusal().empty());
-  run.unsafe.keys = "";
+  run.s.unsafe.keys = "";
   pci(run.driver).root = "/tmp";
   CHECK(run.refusal().empty());
   CHECK(run.accepted.empty());
 }
 
+TEST_CASE("A key in the list consents to its own value alone") {
+  Asked run{"gate.overspeed_rad_s=251"};
+  for (const char* keys : {"gate.overspeed_rad_s", "gate.overspeed_rad_s,a", "a,gate.overspeed_rad_s",
+                           "a,gate.overspeed_rad_s,b", ",gate.overspeed_rad_s"}) {
+    run.s.unsafe.keys = keys;
+    CHECK(run.refusal().empty());
+  }
+  for (const char* keys : {"", ",", "a", "gate", "gate.overspeed_rad_s2", "xgate.overspeed_rad_s",
+                           "gate.overspeed_rad_", "gate.overspeed_rad_s a", "a, gate.overspeed_rad_s"}) {
+    run.s.unsafe.keys = keys;
+    CHECK_FALSE(run.refusal().empty());
+  }
+}
+
 TEST_CASE("A weak value may have a flag of its own that consents") {
-  const auto weak = [](const char* key, const char* consent) {
-    return Asked{.weak = {runtime::WeakValue{.key = key, .value = "1", .class_text = "c", .consent = consent}}};
-  };
-  Asked slow = weak("guardian.timeout_ms", "outputs_on_after_death");
-  CHECK_THAT(slow.refusal(), Contains("guardian.timeout_ms = 1") && Contains("unsafe.outputs_on_after_death=true"));
-  slow.unsafe.outputs_on_after_death = true;
+  Asked slow{"guardian.timeout_ms=41"};
+  CHECK_THAT(slow.refusal(), Contains("guardian.timeout_ms = 41") && Contains("unsafe.outputs_on_after_death=true"));
+  slow.s.unsafe.outputs_on_after_death = true;
   CHECK(slow.refusal().empty());
-  slow.unsafe = {.blind_control = true};
+  slow.s.unsafe = {.outputs_on_after_death = true, .blind_control = true, .foreign_controller = true};
+  CHECK(slow.refusal().empty());
+  slow.s.unsafe = {.blind_control = true, .foreign_controller = true};
   CHECK_FALSE(slow.refusal().empty());
-  Asked blind = weak("gate.sample_age_max_s", "blind_control");
+  Asked blind{"gate.sample_age_max_s=0.051"};
   CHECK_FALSE(blind.refusal().empty());
-  blind.unsafe.blind_control = true;
+  blind.s.unsafe.blind_control = true;
   CHECK(blind.refusal().empty());
+  Asked without{"gate.overspeed_rad_s=251"};
+  without.s.unsafe = {.outputs_on_after_death = true, .blind_control = true, .foreign_controller = true};
+  CHECK_FALSE(without.refusal().empty());
 }
 
 TEST_CASE("The encoders' scale is the rig's, also on an emulated board") {
-  Asked run{.model_counts_per_rev = 2048};
+  Asked run{"model.encoder_counts_per_rev=2048"};
   pci(run.driver).root = "/tmp";
   CHECK_THAT(run.refusal(), Contains("model.encoder_counts_per_rev = 2048") && Contains("give 4096 counts"));
-  run.model_counts_per_rev = 4096;
+  run.s.model.encoder_counts_per_rev = 4096;
   CHECK(run.refusal().empty());
 }
 
 TEST_CASE("A CAN node that would hold its outputs for long needs a person's consent") {
-  Asked node{};
-  node.driver.kind = "can";
+  Asked node{"driver.kind=can"};
   can(node.driver).interface = "can0";  // not there: taken for hardware
   can(node.driver).watchdog_ms = 51;
   CHECK_THAT(node.refusal(), Contains("driver.can.watchdog_ms = 51") && Contains("unsafe.outputs_on_after_death=true"));
-  node.unsafe.outputs_on_after_death = true;
+  node.s.unsafe.outputs_on_after_death = true;
   CHECK(node.refusal().empty());
-  node = {};
-  node.driver.kind = "can";
-  can(node.driver).interface = "unix:/tmp/bus";
-  can(node.driver).watchdog_ms = 10'000;
-  CHECK(node.refusal().empty());
+  Asked emulated{"driver.kind=can"};
+  can(emulated.driver).interface = "unix:/tmp/bus";
+  can(emulated.driver).watchdog_ms = 10'000;
+  CHECK(emulated.refusal().empty());
 }

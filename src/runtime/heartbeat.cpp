@@ -1,5 +1,5 @@
 // Writes and reads the flight recorder's ring, which survives the death of its writer.
-#include "runtime/flight_ring.hpp"
+#include "runtime/heartbeat.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,189 @@
+// What a run may do on hardware: it refuses virtual time, injected faults and weakened limits there.
+#include "config/board_policy.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <variant>
+
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/option_check.hpp"
+#include "driver/injection/injection.hpp"
+#include "rig/formatted_text.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+/// What the options lead to. A kind that no backend has counts as hardware.
+driver::BoardReality reality(const driver::DriverOptions& d) {
+  if (driver::is_known(d.kind)) return driver::reality_of(d);
+  return {.reality = driver::Reality::hardware, .option = "driver.kind = " + d.kind, .is = "is no known board"};
+}
+
+bool is_certainly_real(const driver::BoardReality& board) { return board.reality == driver::Reality::hardware; }
+
+void refuse_virtual_time_on_hardware(const Settings& s, bool virtual_time) {
+  if (!virtual_time || s.driver.emulated) return;
+  throw std::invalid_argument(
+      "--fast: the rig runs in real time only; leave it out, use --backend sim, or, for an emulator in lock-step "
+      "(never for hardware), --set driver.emulated=true");
+}
+
+void refuse_start_speed(const Settings& s) {
+  if (s.experiment.start_speed_rad_s <= 0.0) return;
+  throw std::invalid_argument(
+      "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
+}
+
+void refuse_unfit_options(const Settings& s, bool virtual_time) {
+  if (!driver::is_known(s.driver.kind)) return;
+  const driver::ChosenBackend board = driver::chosen_backend(s.driver);
+  if (!board.entry.check) return;
+  driver::RunFacts run = s.driver.facts(virtual_time);
+  run.rate_Hz = s.control.rate_Hz;
+  run.hardware = is_real_board(s.driver);
+  run.outputs_on_after_death = s.unsafe.outputs_on_after_death;
+  board.entry.check(board.options, run);
+}
+
+void refuse_injection_into_hardware(const Settings& s) {
+  const std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
+  if (injections.empty()) return;
+  const driver::DriverOptions& d = s.driver;
+  const std::string fault = driver::to_text(injections.front());
+  if (!d.emulated) {
+    throw std::invalid_argument(
+        fmt::format("--inject {}: faults are never injected into real hardware; use --backend sim, or for an emulator "
+                    "(never hardware) --set driver.emulated=true",
+                    fault));
+  }
+  if (const driver::BoardReality board = reality(d); is_certainly_real(board)) {
+    throw std::invalid_argument(
+        fmt::format("--inject {}: driver.emulated=true, but {} {}", fault, board.option, board.is));
+  }
+}
+
+void refuse_hardware_without_guardian(const Settings& s) {
+  if (s.guardian.enabled) return;
+  const driver::DriverOptions& d = s.driver;
+  if (d.emulated) {
+    const driver::BoardReality board = reality(d);
+    if (!is_certainly_real(board)) return;
+    throw std::invalid_argument(fmt::format(
+        "guardian.enabled = false: driver.emulated=true, but {} is real hardware, and real hardware needs a "
+        "guardian; leave guardian.enabled out, or name the emulator's",
+        board.option));
+  }
+  throw std::invalid_argument(
+      "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold when the program dies; leave "
+      "it "
+      "out, or for an emulator (never hardware) --set driver.emulated=true");
+}
+
+/// Silence of a single late cycle must not end a run.
+void refuse_impatient_guardian(const Settings& s, bool virtual_time) {
+  if (!s.guardian.enabled || virtual_time) return;
+  const double two_periods_ms = 2.0 * 1e3 / s.control.rate_Hz;
+  if (s.guardian.timeout_ms >= two_periods_ms) return;
+  throw std::invalid_argument(fmt::format(
+      "guardian.timeout_ms = {}: the guardian would end a healthy run, whose cycles are {} ms apart; give at "
+      "least two periods, {} ms, or a higher control.rate_Hz",
+      s.guardian.timeout_ms, two_periods_ms / 2.0, two_periods_ms));
+}
+
+/// True if a person has consented to a weak value: by its key in `unsafe.keys`, or by the flag that its row names.
+bool has_consent(const Key& weak, const Settings& s, const KeyTable& keys) {
+  const std::vector<std::string_view> named = rig::split(s.unsafe.keys, ',');
+  if (std::ranges::find(named, weak.name) != named.end()) return true;
+  const Key* flag = find_key(keys.keys(), fmt::format("unsafe.{}", weak.safety.consent));
+  return flag != nullptr && value_of(*flag) == Value(true);
+}
+
+/// One rule for all options: what weakens the protection by its row needs a person's consent, and is told.
+std::vector<std::string> refuse_weak_values(const Settings& s, const KeyTable& keys) {
+  std::vector<std::string> accepted;
+  if (!is_real_board(s.driver)) return accepted;
+  for (const Key& key : keys.keys()) {
+    if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
+    const std::string value = text_of(value_of(key));
+    const std::string weakness = key.safety.in_words(key.unit);
+    if (!has_consent(key, s, keys)) {
+      const std::string_view consent = key.safety.consent;
+      throw std::invalid_argument(fmt::format(
+          "{0} = {1}: this value weakens the protection of a real board ({2}; {3}); give another one, or "
+          "accept the risk with --set unsafe.keys={0}{4}",
+          key.name, value, weakness, key.meaning, consent.empty() ? "" : fmt::format(" or unsafe.{}=true", consent)));
+    }
+    accepted.push_back(fmt::format("{} = {} weakens the protection of this board ({}; {}); unsafe. accepts it",
+                                   key.name, value, weakness, key.meaning));
+  }
+  return accepted;
+}
+
+/// The gate and the ends of phases would see wrong speeds, on an emulator too.
+void refuse_other_counts(const Settings& s) {
+  const std::int32_t model = s.model.encoder_counts_per_rev;
+  const std::int32_t rig = s.rig.parameters.encoder_counts_per_rev;
+  if (model == rig) return;
+  throw std::invalid_argument(
+      fmt::format("model.encoder_counts_per_rev = {0}: the rig's encoders give {1} counts a revolution by its identity "
+                  "(rig.encoder_counts_per_rev); leave the model's out, or correct the identity with --set "
+                  "rig.encoder_counts_per_rev={0} and commission the board again",
+                  model, rig));
+}
+
+/// A crash of foreign code ends the program. The guardian makes the outputs safe, but a person must want that.
+void refuse_foreign_code(const Settings& s) {
+  const std::string& controller = s.control.controller;
+  if (!control::is_controller_file(controller) || s.unsafe.foreign_controller || !is_real_board(s.driver)) return;
+  throw std::invalid_argument(
+      fmt::format("--controller {}: code from a file would run in the control cycle of a real board; try it with "
+                  "--backend sim first, then accept the risk with --set unsafe.foreign_controller=true",
+                  controller));
+}
+
+/// Lowers a duty cap of the gate to the board's. Refuses a higher one that a person has set.
+void lower_cap(double& cap, std::string_view key, double board_cap, std::string_view board, const KeyTable& keys) {
+  if (cap > board_cap && keys.was_set(fmt::format("gate.{}", key))) {
+    throw std::invalid_argument(
+        fmt::format("gate.{0} = {1}: the board sends at most {2} (driver.{3}.{0}); give a number in (0, {2}]", key, cap,
+                    board_cap, board));
+  }
+  cap = std::min(cap, board_cap);
+}
+
+}  // namespace
+
+bool is_real_board(const driver::DriverOptions& driver) {
+  const driver::BoardReality board = reality(driver);
+  return board.reality == driver::Reality::unknown ? !driver.emulated : is_certainly_real(board);
+}
+
+std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& keys, bool virtual_time) {
+  refuse_virtual_time_on_hardware(s, virtual_time);
+  refuse_start_speed(s);
+  refuse_unfit_options(s, virtual_time);
+  refuse_injection_into_hardware(s);
+  refuse_hardware_without_guardian(s);
+  refuse_impatient_guardian(s, virtual_time);
+  refuse_foreign_code(s);
+  refuse_other_counts(s);
+  return refuse_weak_values(s, keys);
+}
+
+void apply_board_limits(Settings& s, const KeyTable& keys) {
+  const std::string& kind = s.driver.kind;
+  if (!driver::is_known(kind)) {
+    throw std::invalid_argument(
+        fmt::format("driver.kind = {}: this board has no duty caps, so it is not driven", kind));
+  }
+  const driver::OutputGrid board = driver::output_grid(s.driver);
+  lower_cap(s.gate.brake_duty_max, "brake_duty_max", board.brake_duty_max, kind, keys);
+  lower_cap(s.gate.motor_duty_max, "motor_duty_max", board.motor_duty_max, kind, keys);
+  s.driver.encoder_counts_per_rev = s.rig.parameters.encoder_counts_per_rev;
+  s.driver.rate_Hz = s.control.rate_Hz;
+}
+
+}  // namespace abs_hil::config

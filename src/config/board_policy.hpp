@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/key_table.hpp"
+
+namespace abs_hil::config {
+
+/// False for a board that is known to be an emulator: one whose files or interface are not the kernel's, or of which
+/// driver.emulated says so. Cards of the kernel and adapters of a real bus are real whatever driver.emulated says.
+[[nodiscard]] bool is_real_board(const driver::DriverOptions& driver);
+
+/// Refuses what each key's own range allows and what must not reach a rig: virtual time, wheels that turn from the
+/// start, answers that take longer than a period, injected faults, no guardian, a guardian that would end a healthy
+/// run, and on hardware every value that weakens the protection without a person's consent. Throws
+/// std::invalid_argument, which names the key and the fix. Before anything has moved.
+/// @param keys  of `s`
+/// @return the weak values that a person has consented to, a sentence each; none for an emulator
+std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& keys, bool virtual_time);
+
+/// Lowers the gate's duty caps to the board's, so that the controller's anti-windup knows them, and tells the drivers
+/// the encoders' resolution and the rate, which their own checks need. Throws std::invalid_argument for a cap that a
+/// person has set above the board's, and for a board without caps.
+/// @param keys  of `s`
+void apply_board_limits(Settings& s, const KeyTable& keys);
+
+}  // namespace abs_hil::config
