@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate, its plausibility checks and limits, of the rule for values that weaken them, of the
-guard of a board, and of the node's core (firmware/). The script changes one place at a time in their sources (a relation, an operator, a constant, a
-condition, a statement left out), compiles only that file or, for a header, the source that uses it, without
+Mutation run of the command gate, its plausibility checks and limits, of what values weaken them, of the guard of a
+board, and of the node's core (firmware/). The script changes one place at a time in their sources (a relation, an
+operator, a constant, a condition, a statement left out), compiles only that file or, for a header, the source that uses it, without
 optimisation, links it with the tests of its group and runs them. A mutant that the tests do not notice survives.
 mutate_equivalent.txt must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not
 listed or a listed mutant is killed.
