@@ -1,9 +1,9 @@
 // One run of a study has the figures of a whole run.
-#include "study/batch.hpp"
+#include "experiment/simulated_run.hpp"
 
 #include "catch.hpp"
-#include "experiment/simulated_run.hpp"
 #include "paper_plan.hpp"
+#include "study/batch.hpp"
 
 using namespace abs_hil;
 using study::simulate;
