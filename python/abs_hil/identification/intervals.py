@@ -61,7 +61,7 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter)
 
 
-def information(fit: Fit, more: np.ndarray) -> Spread:
+def information(fit: Fit, more: np.ndarray | float = 0.0) -> Spread:
     """Spread by the filter's information, and by `more` (structure.unsettled)."""
     return Spread(fit.covariance() + more, fit.covariance() + more)
 
