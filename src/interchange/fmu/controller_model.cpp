@@ -103,13 +103,7 @@ void ControllerModel::step(double duration_s) {
   const rig::Command sent = grid_.as_sent(wanted);
   logic_->commanded(sent);
   time_s_ += duration_s;
-  outputs_ = {.brake_torque_ref_Nm = sent.brake_torque_Nm,
-              .brake_duty = sent.brake_duty,
-              .omega1_est_rad_s = record.control.speeds_est.omega1_rad_s,
-              .omega2_est_rad_s = record.control.speeds_est.omega2_rad_s,
-              .slip_est = record.control.slip_est,
-              .theta_est_N = std::isnan(record.control.theta_est_N) ? 0.0 : record.control.theta_est_N,
-              .brake_torque_est_Nm = record.control.brake_torque_est_Nm};
+  outputs_ = ControllerOutputs::of(sent, record.control);
 }
 
 void ControllerModel::exchange_state(rig::StateBytes& state) {

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <memory>
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/driver/backend.hpp"
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "driver/board_options.hpp"
 #include "experiment/options.hpp"
@@ -43,6 +46,16 @@ struct ControllerOutputs {
   ABS_HIL_OPTION(double, slip_est, 0.0, .meaning = "slip from the estimated speeds");
   ABS_HIL_OPTION(double, theta_est_N, 0.0, .unit = "N", .meaning = "estimated peak tyre force; 0 if the law has none");
   ABS_HIL_OPTION(double, brake_torque_est_Nm, 0.0, .unit = "N m", .meaning = "brake torque estimated to act");
+
+  [[nodiscard]] static ControllerOutputs of(const rig::Command& sent, const rig::ControlState& control) {
+    return {.brake_torque_ref_Nm = sent.brake_torque_Nm,
+            .brake_duty = sent.brake_duty,
+            .omega1_est_rad_s = control.speeds_est.omega1_rad_s,
+            .omega2_est_rad_s = control.speeds_est.omega2_rad_s,
+            .slip_est = control.slip_est,
+            .theta_est_N = std::isnan(control.theta_est_N) ? 0.0 : control.theta_est_N,
+            .brake_torque_est_Nm = control.brake_torque_est_Nm};
+  }
 };
 
 /// A slip controller with its observers and its estimate of the brake: the logic of a run's braking, without the
