@@ -120,6 +120,16 @@ class Run::SlowCycleWatch {
  public:
   /// @param period_ns  of virtual time; 0: real time, which limits no whole
   explicit SlowCycleWatch(std::int64_t period_ns) : period_s_(static_cast<double>(period_ns) * 1e-9) {}
+  SlowCycleWatch(const SlowCycleWatch&) = delete;
+  SlowCycleWatch& operator=(const SlowCycleWatch&) = delete;
+  ~SlowCycleWatch() {
+    {
+      const std::lock_guard lock(mutex_);
+      ending_ = true;
+    }
+    end_.notify_all();
+    thread_.join();
+  }
   /// Real-time safe.
   void cycle_begins() noexcept { inside_.store(true, std::memory_order_relaxed); }
   void cycle_ended() noexcept {
@@ -128,7 +138,7 @@ class Run::SlowCycleWatch {
   }
 
  private:
-  void watch(const std::stop_token& stop) {
+  void watch() {
     constexpr auto tick = std::chrono::milliseconds(100);
     constexpr double tick_s = 0.1;
     constexpr double cycle_max_s = 5.0;
@@ -139,7 +149,7 @@ class Run::SlowCycleWatch {
     double same_s = 0.0;
     double whole_s = 0.0;
     std::unique_lock lock(mutex_);
-    while (!end_.wait_for(lock, stop, tick, [&stop] { return stop.stop_requested(); })) {
+    while (!end_.wait_for(lock, tick, [this] { return ending_; })) {
       const std::uint64_t cycles = cycles_.load(std::memory_order_relaxed);
       const bool inside = inside_.load(std::memory_order_relaxed);
       same_s = inside && cycles == seen ? same_s + tick_s : 0.0;
@@ -160,8 +170,9 @@ class Run::SlowCycleWatch {
   std::atomic<std::uint64_t> cycles_{0};
   std::atomic<bool> inside_{false};
   std::mutex mutex_{};
-  std::condition_variable_any end_{};
-  std::jthread thread_{[this](const std::stop_token& stop) { watch(stop); }};
+  std::condition_variable end_{};
+  bool ending_{false};
+  std::thread thread_{[this] { watch(); }};  // macOS has no jthread
 };
 
 Run::~Run() = default;
