@@ -35,6 +35,7 @@ OTHERS = {'two lags': ({'release': 1.5}, {'brake_release_ratio': 1.5}), 'bent ma
           'friction by car speed': ({'by_speed_s_m': 0.01}, "changes with the lower wheel's speed"),
           'bearings that warm up': ({'stiff': 0.6}, 'bearing drags less as time goes'),
           'friction by Stribeck': ({'at_rest': 0.25}, 'the friction is no straight line of the sliding speed'),
+          'readings that jitter': ({'jitter_s': 15e-6}, {}),
           'unequal slots': ({'slots': 0.3}, {'upper_encoder_slot_error_counts': 0.3}),
           'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0},
                                {'brake_fading_per_J': 4e-4, 'brake_cooling_per_s': 0.25})}
@@ -44,7 +45,8 @@ KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc'
          'release', 'curved map', 'falling friction', 'release + curved map + fading', 'fading + cooling', 'slots',
          'quiet + slots')
 KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed', 'two lags + quiet',
-                   'friction by car speed', 'brake that cools', 'unequal slots', 'bearings that warm up', 'friction by Stribeck')
+                   'friction by car speed', 'brake that cools', 'unequal slots', 'bearings that warm up', 'friction by Stribeck',
+                   'readings that jitter', 'readings that jitter + quiet')
 
 
 def one(plant, kind, seed, keep=None):

@@ -19,7 +19,8 @@ PER_COUNT_RAD = 2 * math.pi / 4096
 
 
 def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_sliding_s_m=0.0, by_speed_s_m=0.0,
-           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0, stiff=0.0, at_rest=0.0):
+           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0, stiff=0.0, at_rest=0.0,
+           jitter_s=0.0):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
@@ -27,7 +28,8 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
     friction falls for each m/s between the wheels' surfaces, and of the lower one; fading_per_J: share of the brake's
     torque lost for each joule in it, which leaves it over `cools_in_s`; slots: by how much of a count every second edge of the
     upper disc comes late; stiff: by how much of itself more both bearings drag at first, which passes in 8 s; at_rest: share of
-    the friction that a sliding tyre loses, most of it within STRIBECK_M_S
+    the friction that a sliding tyre loses, most of it within STRIBECK_M_S; jitter_s: standard deviation of the time by which both
+    encoders are read early or late
     """
     v = values
     angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
@@ -56,8 +58,9 @@ def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_slidi
 
     counts = np.zeros((len(log), 2))
     for row in range(len(log)):
-        pairs, part = divmod(angle1 / PER_COUNT_RAD, 2.0)
-        counts[row] = 2 * pairs + (part >= 1.0 + slots), math.floor(angle2 / PER_COUNT_RAD)
+        late_s = jitter_s * random.standard_normal() if jitter_s else 0.0
+        pairs, part = divmod((angle1 + late_s * w1) / PER_COUNT_RAD, 2.0)
+        counts[row] = 2 * pairs + (part >= 1.0 + slots), math.floor((angle2 + late_s * w2) / PER_COUNT_RAD)
         if row + 1 == len(log):
             break
         interval = log.time_s[row + 1] - log.time_s[row]

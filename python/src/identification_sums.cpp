@@ -2,6 +2,9 @@
 //
 // Within a window nothing but the counts' steps disturbs, so all of its readings together are one measurement of the
 // state at its start and of the parameters: their sums of squares and products say everything.
+//
+// Where the instants of the readings jitter, both readings of a row share an error: their covariance, over that of the
+// counts' steps, is diag(1 / weight) + g g'. What the first reading tells of the second one's error is taken from it.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -10,19 +13,22 @@
 
 namespace abs_hil::python {
 
-/// The sums of each window. Shapes as `linearise` gives them; `residual` (rows, 2, columns), `weight` (rows, 2).
+/// The sums of each window. Shapes as `linearise` gives them; `residual` (rows, 2, columns), `weight` (rows, 2), and g,
+/// `common_sd` (rows, 2), if there is jitter.
 py::dict condense(const py::dict& d) {
   const auto by_state = d["by_state"].cast<Array>();
   const auto by_parameter = d["by_parameter"].cast<Array>();
   const auto residual = d["residual"].cast<Array>();
   const auto weight = d["weight"].cast<Array>();
+  const auto common_sd = d.contains("common_sd") ? d["common_sd"].cast<Array>() : Array();
   const auto first = d["first"].cast<Indices>();
   const std::ptrdiff_t windows = first.size() - 1;
   const std::ptrdiff_t p = by_parameter.shape(2);
   const std::ptrdiff_t c = residual.shape(2);
   const std::ptrdiff_t m = states + p;
   if (windows < 1 || by_state.shape(0) != by_parameter.shape(0) || residual.shape(0) != by_parameter.shape(0) ||
-      weight.shape(0) != by_parameter.shape(0) || first.data()[windows] - first.data()[0] != by_parameter.shape(0)) {
+      weight.shape(0) != by_parameter.shape(0) || (common_sd.size() > 0 && common_sd.size() != weight.size()) ||
+      first.data()[windows] - first.data()[0] != by_parameter.shape(0)) {
     throw std::invalid_argument("the arrays of a piece do not fit together");
   }
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -31,6 +37,7 @@ py::dict condense(const py::dict& d) {
   auto square = new_array<Array>({windows, c, c});
   auto log_weight = new_array<Array>({windows});
   auto readings = new_array<Array>({windows, 2});
+  const double* const common = common_sd.size() > 0 ? common_sd.data() : nullptr;
   double* const gram_at = gram.mutable_data();
   double* const cross_at = cross.mutable_data();
   double* const square_at = square.mutable_data();
@@ -56,8 +63,19 @@ py::dict condense(const py::dict& d) {
         for (std::ptrdiff_t i = 0; i < moving; ++i) row(angles + i) = by_state.data()[at * moving + i];
         for (std::ptrdiff_t i = 0; i < p; ++i) row(states + i) = by_parameter.data()[at * p + i];
         for (std::ptrdiff_t i = 0; i < c; ++i) row(m + i) = residual.data()[at * c + i];
-        row *= std::sqrt(one);
-        logarithms += std::log(one);
+        double precision = one;
+        if (common != nullptr) {
+          double variance = 1.0 / one + common[at] * common[at];
+          if (at % angles == 1 && weight.data()[at - 1] > 0.0) {
+            const double first_variance = 1.0 / weight.data()[at - 1] + common[at - 1] * common[at - 1];
+            const double share = common[at - 1] * common[at] / std::sqrt(first_variance);
+            row -= share * rows.col(kept - 2);
+            variance -= share * share;
+          }
+          precision = 1.0 / variance;
+        }
+        row *= std::sqrt(precision);
+        logarithms += std::log(precision);
         weights += one;
       }
       products.setZero();

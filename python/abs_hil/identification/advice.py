@@ -80,7 +80,8 @@ def information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances)
     old = fit.problem
     motion = motion_of(log, old.counts_per_rev)
     problem = Problem(old.form, old.base, [log], [motion], [segments_of(log, motion)], old.given, old.fixed,
-                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, (), old.flaws)
+                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, (), old.flaws,
+                      jitter_s=old.jitter_s)
     values = {key: value for key, value in fit.values.items() if not key.startswith('brake_factor')}
     other = Fit(problem, values, pieces_of(problem, values, window_s), disturbances, window_s,
                 np.array([p.key not in old.fixed and p.key != 'u0' for p in problem.parameters]))

@@ -167,6 +167,9 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     for wheel, slots in problem.slots.items():
         parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate.normal(slots.error_counts, slots.sd_counts, '1')
         notes.append(f'every second edge of the {wheel} encoder comes late by {slots.error_counts:.2g} of a count')
+    if problem.jitter_s > 0.0:
+        notes.append(f'the encoders were read {1e6 * problem.jitter_s:.2g} us early or late (standard deviation); the intervals '
+                     'count with it, and would be narrower with the true times in a column sample_time_s')
     combinations: dict[str, Estimate] = {}
     for name, (unit, parts, cure) in COMBINATIONS.items():
         if any(part not in parameters for part in parts):

@@ -10,7 +10,7 @@ import scipy.stats
 from ..core import _core
 from .linear import filtered, solved, to_rest
 from .parameters import COMBINATIONS, WHEELS, disc_of
-from .problem import QUIET, Disturbances, Fit
+from .problem import COUNT_VARIANCE, QUIET, Disturbances, Fit
 from .slots import middles
 
 REPLICATES = 80
@@ -48,7 +48,11 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
             exact = piece.linear['read'] / per_count
             phase = chosen[piece.log][None]
             from_edge = exact + phase * np.where(late > 0.0, 2.0, 1.0)
-            residual = (middles(from_edge, late) - from_edge) * per_count
+            jittered = from_edge
+            if problem.jitter_s > 0.0:
+                common = problem.common_sd(piece)[:, :, None] * np.sqrt(COUNT_VARIANCE)
+                jittered = from_edge + common * random.standard_normal((len(common), 1, chosen.shape[2]))
+            residual = (middles(jittered, late) - from_edge) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros((*piece.states.shape, chosen.shape[2]))}
             changed.update(_core.condense(changed))
             found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]

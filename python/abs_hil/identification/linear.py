@@ -107,6 +107,8 @@ def measure(problem: Problem, values: Mapping[str, float], piece: Piece, angles:
     gap[:-1] = np.stack(ends, axis=2)[:-1] - piece.states[1:, :, None]
     linear.update(read=read, residual=residual, weight=weight, gap=gap, stands=piece.stands, first=piece.first,
                   prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
+    if problem.jitter_s > 0.0:
+        linear['common_sd'] = problem.common_sd(piece)
     linear.update(_core.condense(linear))
 
 

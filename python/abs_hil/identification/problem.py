@@ -10,6 +10,7 @@ import numpy as np
 from ..core import _core
 from ..options import options
 from .brake_flaws import act, brake_torques, with_flaws
+from .jitter import jitter_of
 from .logs import Log, Motion, motion_of, segments_of
 from .parameters import DELAY, FLAWS, FRICTION_FALL, RATE_LIMIT, RELEASE, Form, Parameter, base_options, disc_of
 from .slots import Slots, slots_of, weighed
@@ -67,7 +68,8 @@ class Piece:
 @dataclass
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
-    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones."""
+    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is that of the readings'
+    instants."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -82,6 +84,7 @@ class Problem:
     discs: tuple[str, ...] = ()
     flaws: tuple[str, ...] = ()
     slots: Mapping[str, Slots] = field(default_factory=dict)
+    jitter_s: float = 0.0
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
@@ -96,7 +99,8 @@ class Problem:
         given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
         keys = {p.key for p in form.parameters} | {RATE_LIMIT.key}
         return cls(form, base, logs, weighed(logs, motions, slots), segments, given, {k: v for k, v in known.items() if k in keys},
-                   counts_per_rev, tuple(drifts), discs=tuple(discs), slots=slots)
+                   counts_per_rev, tuple(drifts), discs=tuple(discs), slots=slots,
+                   jitter_s=jitter_of(logs, motions, counts_per_rev))
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -142,6 +146,10 @@ class Problem:
     @property
     def radians_per_count(self) -> float:
         return 2 * np.pi / self.counts_per_rev
+
+    def common_sd(self, piece: Piece) -> np.ndarray:
+        """Of the error by jitter that both readings of a row share, over that by the counts' steps, shape (rows, 2)."""
+        return np.asarray(self.jitter_s / np.sqrt(self.variance_rad2) * self.motions[piece.log].speed_rad_s[piece.rows])
 
     @property
     def variance_rad2(self) -> float:
