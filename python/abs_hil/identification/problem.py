@@ -68,8 +68,8 @@ class Piece:
 @dataclass
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
-    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is that of the readings'
-    instants."""
+    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is the
+    standard deviation of the readings' instants (jitter.py)."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -148,7 +148,8 @@ class Problem:
         return 2 * np.pi / self.counts_per_rev
 
     def common_sd(self, piece: Piece) -> np.ndarray:
-        """Of the error by jitter that both readings of a row share, over that by the counts' steps, shape (rows, 2)."""
+        """Standard deviation of the error by jitter, which both readings of a row share, over that of the counts' steps; shape
+        (rows, 2)."""
         return np.asarray(self.jitter_s / np.sqrt(self.variance_rad2) * self.motions[piece.log].speed_rad_s[piece.rows])
 
     @property
