@@ -19,8 +19,7 @@ PER_COUNT_RAD = 2 * math.pi / 4096
 
 
 def driven(log, values, random, wander=1.0, release=1.0, curvature=0.0, by_sliding_s_m=0.0, by_speed_s_m=0.0,
-           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0, stiff=0.0, at_rest=0.0,
-           jitter_s=0.0):
+           fading_per_J=0.0, cools_in_s=math.inf, slots=0.0, stiff=0.0, at_rest=0.0, jitter_s=0.0):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
