@@ -4,6 +4,7 @@
 set -euo pipefail
 enter=(unshare -n)
 [ "$(id -u)" -eq 0 ] || enter=(unshare -rn)
-"${enter[@]}" true 2>/dev/null || { echo "cannot make a private network namespace here (unshare -n)" >&2; exit 77; }
+"${enter[@]}" true 2>/dev/null ||
+  { echo "SKIPPED: cannot make a private network namespace here (unshare -n); run as root" >&2; exit 77; }
 # shellcheck disable=SC2016  # expanded by the inner shell
 exec "${enter[@]}" sh -c 'ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo && exec "$@"' -- "$@"

@@ -8,7 +8,7 @@ trap 'rm -rf "$scratch"' EXIT
 "$1" -m venv "$scratch/env"
 "$scratch/env/bin/pip" --disable-pip-version-check --quiet install --only-binary :all: \
   'numpy>=2' pytest pandas scipy matplotlib gymnasium ||
-  { echo "numpy2_test: no NumPy 2 from PyPI"; exit 77; }
+  { echo "SKIPPED: no NumPy 2 from PyPI"; exit 77; }
 "$scratch/env/bin/python" -c 'import numpy; print("numpy", numpy.__version__)'
 tests() { OPENBLAS_NUM_THREADS=1 "$scratch/env/bin/python" -m pytest -q -p no:cacheprovider "$@"; }
 tests "$2"/python/tests/test_{bits,simulate,controllers,load,learning}.py

@@ -134,4 +134,4 @@ class FailClosed(ProgramTest):
 
 
 if __name__ == '__main__':
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -302,4 +302,4 @@ class Guardian(RigTest):
 
 if __name__ == '__main__':
     skip_unless_possible()
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -30,8 +30,9 @@ def enter(arguments, what):
     if missing:
         print(f'SKIPPED: no {", ".join(missing)} (scripts/setup.sh {packages})')
         return 77
-    if subprocess.run([*words, 'true'], capture_output=True).returncode != 0:
-        print('SKIPPED: no namespaces of our own here (root)')
+    probe = subprocess.run([*words, 'true'], capture_output=True, text=True)
+    if probe.returncode != 0:
+        print(f'SKIPPED: no namespaces of our own here (they need root): {probe.stderr.strip()}')
         return 77
     return subprocess.run([*words, sys.executable, *arguments], env=dict(os.environ, **{INSIDE: '1'})).returncode
 

@@ -338,4 +338,4 @@ class Hm2Run(EmulatorTest):
 
 if __name__ == '__main__':
     skip_unless_possible()
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -126,4 +126,4 @@ class RigScript(RigTest):
 
 if __name__ == '__main__':
     skip_unless_possible()
-    unittest.main()
+    unittest.main(verbosity=2)

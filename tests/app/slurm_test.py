@@ -32,9 +32,9 @@ plant.B = {{ from = 20, to = 30 }}
 
 def enter(arguments):
     """Runs this file inside namespaces of its own."""
-    words = ['unshare', '--net', '--pid', '--fork', '--mount-proc', '--kill-child']
+    words = ['unshare', '--net', '--pid', '--fork', '--mount-proc', '--propagation', 'unchanged', '--kill-child']
     if why := missing() or ('' if subprocess.run([*words, 'true']).returncode == 0 else 'no namespaces here'):
-        print(f'skipped: {why}')
+        print(f'SKIPPED: {why}')
         return 77
     return subprocess.run([*words, sys.executable, *arguments], env=dict(os.environ, **{INSIDE: '1'})).returncode
 

@@ -311,4 +311,4 @@ plant.theta_N = {{ from = 15, to = 30 }}
 
 
 if __name__ == '__main__':
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -389,4 +389,4 @@ class Page(ReportTest):
 
 
 if __name__ == '__main__':
-    unittest.main()
+    unittest.main(verbosity=2)

