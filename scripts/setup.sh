@@ -35,7 +35,11 @@ install_missing() {
 echo "== $(date '+%Y-%m-%d %H:%M:%S') $list: ${missing[*]}" >>"$log"
 status=0
 install_missing >>"$log" 2>&1 || status=$?
-[ $status -eq 0 ] && exit 0
+if [ $status -eq 0 ]; then
+  # What build/python got from PyPI may stand before a package that is new now.
+  if [ "${ABS_HIL_SETUP:-}" != python ] && [[ " ${missing[*]}" == *" python3-"* ]]; then "$here/setup_python.sh" --again || true; fi
+  exit 0
+fi
 tail -n 20 "$log" >&2
 echo "setup: apt-get failed with status $status; the end of its output is above, all of it in $log" >&2
 exit $status
