@@ -5,6 +5,7 @@ from typing import Any, Optional
 import numpy as np
 
 version: str
+revision: str
 
 def set_config_dir(folder: str) -> None: ...
 def config_dir() -> str: ...

@@ -1,15 +1,15 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
-import argparse
 import functools
 import operator
 import os
 import pathlib
 import shutil
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
 from .core import _core, load_network
+from .places import misfit
 
 #: a configuration value as Python has it
 Value = Union[bool, int, float, str]
@@ -31,6 +31,8 @@ def program() -> str:
 
 def failed(name: str, error: object, status: int = 2) -> int:
     """Says why a program ends; its exit status."""
+    if isinstance(error, Exception) and (missing := misfit(error)):  # some packages are imported only where they are needed
+        error, status = missing, 3
     print(f'{name}: {error}', file=sys.stderr)
     return status
 
@@ -64,15 +66,6 @@ def _assignments(values: Any) -> list[str]:
         except ValueError as error:
             raise ValueError(f'set: {key}: {error}') from None
     return assignments
-
-
-def whole(least: int, most: int) -> Callable[[str], int]:
-    """A type of argparse: a whole number of this range."""
-    def number(text: str) -> int:
-        if not text.strip().lstrip('+-').isdecimal() or not least <= int(text) <= most:
-            raise argparse.ArgumentTypeError(f'"{text}" is no whole number from {least} to {most}')
-        return int(text)
-    return number
 
 
 def options(*, controller: Any = None, plant: PathLike | None = None, model: PathLike | None = None,

@@ -9,6 +9,9 @@ import os
 import pathlib
 import sys
 
+from . import parsers
+from .places import misfit
+
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.training',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
@@ -64,21 +67,37 @@ def start(name: str, arguments: list[str]) -> int:
     return 1
 
 
+def version(name: str) -> str:
+    """What --version prints: program, version and commit, of the compiled module."""
+    from .core import _core
+    return f'abs_{name} {_core.version} ({_core.revision})'
+
+
 def _start(name: str, arguments: list[str]) -> int:
     # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    said = io.StringIO()  # NumPy prints a page about packages that do not fit it
     try:
-        return int(importlib.import_module(PROGRAMS[name]).main(arguments))
-    except ImportError as error:  # some modules are imported only where they are needed
-        print(f'abs_{name}: {error}. On Debian, "scripts/setup.sh packages-analysis.txt" in the source folder installs what it '
-              'needs; elsewhere: pip install .', file=sys.stderr)
-        return 3
+        if '--version' in arguments:
+            print(version(name))
+            return 0
+        getattr(parsers, name.replace('-', '_'))().parse_args(arguments)  # --help and wrong options end here, without a package
+        with contextlib.redirect_stderr(said):
+            main = importlib.import_module(PROGRAMS[name]).main
+        print(end=said.getvalue(), file=sys.stderr)
+        return int(main(arguments))
     except SystemExit as end:  # of argparse
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:
         return 0
+    except Exception as error:
+        text = misfit(error) or (error if isinstance(error, ImportError) else '')
+        if not text:
+            raise
+        print(f'abs_{name}: {text}', file=sys.stderr)
+        return 3
 
 
 def command() -> None:

@@ -4,13 +4,12 @@ The plant paper-table1 with a tyre, wheels, brake, bearings and motor of its own
 brake, motor and bearings also change a little all the time, and both encoder discs sit off their centres. J2 and r2 stay those
 of Table 1, as if somebody had measured them.
 """
-import argparse
-import pathlib
 import random
 from collections.abc import Sequence
 
+from . import parsers
 from .files import refuse_existing, write_text
-from .options import failed, whole
+from .options import failed
 from .simulation import keys
 
 #: key: largest change, over the value of START
@@ -49,13 +48,7 @@ def unknown_rig(seed: int, wanders: bool) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser('abs_hil rig', allow_abbrev=False, description='Writes a simulated rig that a class does not '
-                                     'know, as a file for --plant (docs/class.md)')
-    parser.add_argument('kind', choices=('steady', 'wandering'), help='whether it changes a little all the time')
-    parser.add_argument('seed', metavar='SEED', type=whole(0, 2**63 - 1), help='which one; the same number is the same rig')
-    parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('rig.toml'), help='[rig.toml]')
-    parser.add_argument('--force', action='store_true', help='replace an existing file')
-    o = parser.parse_args(arguments)
+    o = parsers.rig().parse_args(arguments)
     try:
         refuse_existing(o.out, '--out', o.force)
         write_text(o.out, unknown_rig(o.seed, o.kind == 'wandering'))

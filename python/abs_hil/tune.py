@@ -3,18 +3,19 @@ import argparse
 import inspect
 import itertools
 import math
-import pathlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.optimize import differential_evolution
 
+from . import parsers
 from .core import _core
 from .figures import OVERSHOOT
 from .files import make_folder, write_text, write_whole
-from .options import failed, options, whole
+from .options import failed, options
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 
 #: the paper brakes from 1625 rpm
@@ -157,7 +158,6 @@ def search(judge: Any, generations: int, seed: int,
 
     The defaults do not enter the search, so that it finds the same gains whatever they are.
     """
-    from scipy.optimize import differential_evolution
     start_cost = float(judge.costs([None])[0])
     judge.evaluations = 0
     dimensions = len(judge.gains)
@@ -191,26 +191,6 @@ def to_toml(judge: Judge, found: Found, comment: str) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser('abs_tune', allow_abbrev=False, description="Searches for a controller's gains in "
-                                   'simulation and writes them as a configuration file')
-    made.add_argument('--controllers', '--controller', metavar='A,B,...',
-                      help='controllers to tune (default: all that have gains)')
-    made.add_argument('--plants', metavar='A,B,...', default='paper-table1,paper-timing',
-                      help='plants to tune on [paper-table1,paper-timing]')
-    made.add_argument('--model', metavar='NAME|FILE', help="the controllers' model, by name or TOML file (default: each plant)")
-    made.add_argument('--folder', metavar='DIR', required=True, type=pathlib.Path,
-                      help='folder for CONTROLLER.toml; made if there is none')
-    made.add_argument('--cases', metavar='N', default=6, type=whole(1, 1000), help='varied plants for each plant [6]')
-    made.add_argument('--generations', metavar='N', default=24, type=whole(1, 10_000),
-                      help='generations of the search [24]')
-    made.add_argument('--seed', metavar='N', default=1, type=whole(0, 2**63 - 1), help='seed of the search [1]')
-    made.add_argument('--threads', metavar='N', default=0, type=whole(0, 1024),
-                      help='number of threads, 0: one for each processor; does not change the results [0]')
-    made.add_argument('--version', action='version', version=_core.version)
-    return made
-
-
 def _tune(controller: str, o: argparse.Namespace) -> None:
     plants = [name for name in o.plants.split(',') if name]
     judge = Judge(controller, Training(plants, o.cases, o.model, o.threads))
@@ -231,7 +211,7 @@ def _tune(controller: str, o: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    o = parser().parse_args(arguments)
+    o = parsers.tune().parse_args(arguments)
     try:
         chosen = tunable() if o.controllers is None else [name for name in o.controllers.split(',') if name]
         if not chosen or not o.plants.strip(','):

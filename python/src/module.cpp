@@ -45,6 +45,7 @@ PYBIND11_MODULE(_core, module) {
   spdlog::set_level(spdlog::level::warn);
   spdlog::set_pattern("abs_hil: %l: %v");
   module.attr("version") = ABS_HIL_VERSION;
+  module.attr("revision") = run_folder::build_facts().git_revision;
   module.def("set_config_dir", [](const std::string& folder) { config::set_own_config_dir(folder); });
   module.def("config_dir", [] { return config::config_dir().string(); });
   python::add_controllers(module);

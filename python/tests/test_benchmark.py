@@ -20,7 +20,8 @@ from abs_hil import programs
 from abs_hil.benchmark import Entry, bounds, cases, run
 from abs_hil.benchmark.program import main
 from abs_hil.interchange.host import made
-from abs_hil.report.page import Unavailable, plotly_js
+from abs_hil.places import Unavailable
+from abs_hil.report.page import plotly_js
 
 #: of everything that version 2 consists of
 SET_2 = '0a2c950cf849513e355fa199a7f981751edded326ce8d729ad3ec9eca15153ae'

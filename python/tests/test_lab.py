@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from abs_hil import programs
 from abs_hil.lab import exercise, page
 
 WASM = b'\0asm\1\0\0\0'
@@ -77,7 +78,7 @@ def test_the_page_holds_all_it_needs(tmp_path, with_module):
 
 def test_without_the_module(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(page, '_FOLDER', tmp_path)
-    assert page.main(['--out', str(tmp_path / 'lab.html')]) == 2
+    assert programs.start('lab', ['--out', str(tmp_path / 'lab.html')]) == 3
     assert 'abs_hil_lab.wasm) is missing; scripts/lab.sh' in capsys.readouterr().err
     assert not (tmp_path / 'lab.html').exists()
 

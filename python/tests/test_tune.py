@@ -1,7 +1,6 @@
 """The search for gains: what it searches, its cost, its result."""
 import math
 import pathlib
-import sys
 
 import numpy as np
 import pytest
@@ -109,11 +108,3 @@ def test_shipped_gains_of_the_baselines_are_the_recorded_ones(controller):
 def test_the_papers_controller_ships_with_table_1():
     shipped = abs_hil.keys()
     assert [shipped[f'control.adaptive.{name}']['value'] for name in ('gamma', 'ks0', 'ks1', 'zeta0')] == [21, 19, 32, 0]
-
-
-def test_a_program_without_its_package_says_how_to_get_it(monkeypatch, capsys, tmp_path):
-    """scripts/run.sh leaves out scipy, which `abs_hil tune` imports only where it needs it."""
-    for name in [name for name in sys.modules if name.partition('.')[0] == 'scipy'] + ['scipy', 'scipy.optimize']:
-        monkeypatch.setitem(sys.modules, name, None)
-    assert programs.start('tune', ['--folder', str(tmp_path), '--controllers', 'pi']) == 3
-    assert 'scripts/setup.sh packages-analysis.txt' in capsys.readouterr().err

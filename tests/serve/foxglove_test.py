@@ -200,7 +200,7 @@ def refused(serve, folder):
     (folder / 'foxglove.py').write_text('raise ImportError("No module named \'foxglove\'")\n')
     without = {**os.environ, 'PYTHONPATH': f'{folder}:{os.environ["PYTHONPATH"]}'}
     for options, environment, status, words in (
-            (['--foxglove'], without, 3, 'pip install foxglove-sdk'),
+            (['--foxglove'], without, 3, 'python-packages-tests.txt'),
             (['--foxglove', '65536'], None, 2, 'LOG stands before --foxglove'),
             ([folder / 'run.lcmlog', '--speed', '0', '--foxglove', '0'], None, 2, 'give --speed above 0')):
         ended = subprocess.run([serve, '--port', '0', *options], env=environment, capture_output=True, text=True, timeout=30)

@@ -91,11 +91,7 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
     own = stored(kept) if kept is not None and kept.exists() else {}
     known = stored() | own
     for case in missing(cases, known):
-        try:
-            from ..optimum import NoOptimum
-        except ImportError:
-            raise ValueError('the bounds of drawn cases are computed with casadi; pip install casadi, or give --bounds FILE '
-                             'with all of them') from None
+        from ..optimum import NoOptimum
         try:
             own[identity(case)] = compute(case)
         except NoOptimum:

@@ -6,10 +6,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .. import parsers
 from ..core import _core
 from ..files import read_text, write_text, write_whole
 from ..nesting import parse_json
-from ..options import Value, failed, whole
+from ..options import Value, failed
 from ..report.page import plotly_js
 from ..simulation import controllers
 from . import bounds, cases
@@ -20,29 +21,6 @@ from .score import Entry, keeps, run
 SHOWN = 20
 #: what a figure may differ by, relative: another compiler may round differently
 TOLERANCE = 1e-6
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='abs_hil benchmark', allow_abbrev=False, description=__doc__.split(' (docs')[0] + '.')
-    parser.add_argument('--controller', '--controllers', metavar='C,...', action='append', default=[],
-                        help='names, FILE.so, FILE.fmu, or MODULE:CLASS of controllers in Python; may be repeated '
-                             '(all controllers of the program)')
-    parser.add_argument('--set', metavar='KEY=VALUE', action='append', default=[],
-                        help='a value under control. for every controller; may be repeated')
-    parser.add_argument('--quick', action='store_true', help='12 cases with one seed: a check, no score')
-    parser.add_argument('--warm', action='store_true',
-                        help='scores laws that keep something of the last braking also after one braking of each case')
-    parser.add_argument('--draw', metavar='SEED', type=whole(0, 2**63 - 1), help='only cases that this seed draws; needs casadi')
-    parser.add_argument('--count', metavar='N', type=whole(1, 10_000), help=f'how many of them ({cases.DRAWN})')
-    parser.add_argument('--bounds', metavar='FILE', type=pathlib.Path,
-                        help='keeps the bounds of drawn cases, so that they need not be computed again')
-    parser.add_argument('--verify', metavar='FILE', type=pathlib.Path,
-                        help='makes the runs of a file of --json again; status 1 if anything differs')
-    parser.add_argument('--threads', metavar='N', type=whole(0, 1024), default=0, help='0: one for each processor')
-    parser.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
-    parser.add_argument('--page', metavar='FILE', type=pathlib.Path,
-                        help='the page with the groups of cases: HTML with figures for FILE.html, otherwise Markdown')
-    return parser
 
 
 def _settings(texts: Sequence[str]) -> dict[str, Value]:
@@ -127,7 +105,7 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = _parser()
+    parser = parsers.benchmark()
     given = parser.parse_args(arguments)
     idle = ({*vars(given)} - {'verify', 'threads'} if given.verify else () if given.draw is not None else ('bounds', 'count'))
     try:

@@ -3,19 +3,18 @@ left."""
 import argparse
 import contextlib
 import json
-import pathlib
 import sys
 import time
 from typing import TextIO
 
-from ..core import _core
+from .. import parsers
 from ..files import make_folder, refuse_existing, write_text, write_whole
-from ..options import failed, whole
-from ..report.page import Unavailable, plotly_js
+from ..options import failed
+from ..places import Unavailable, misfit
+from ..report.page import plotly_js
 from ..report.text import clean
 from .estimate import identify
 from .found import Identified
-from .parameters import FORMS
 from .results import as_json, as_toml, validate, validating, words
 
 MISFIT = 1
@@ -80,29 +79,6 @@ def duration(seconds: float) -> str:
     return f'{seconds:.0f} s' if seconds < 90.0 else f'{seconds / 60.0:.0f} min'
 
 
-def parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser('abs_identify', allow_abbrev=False, description="Estimates the rig's parameters from its own "
-                                   'logs and writes a model file (docs/identification.md)')
-    made.add_argument('logs', metavar='LOG', nargs='+', help='run folders, event logs, or CSV files with time_s, upper_counts, '
-                      'lower_counts, brake_pwm, motor_pwm and, if there, phase and wheels_apart; gzip or not')
-    made.add_argument('--start', metavar='NAME|FILE', default='paper-table1',
-                      help='plant with the given J2 and r2, and what the logs do not tell [paper-table1]')
-    made.add_argument('--fix', metavar='KEY[=VALUE]', action='append', default=[],
-                      help="leave a parameter at its start's value, or at this one: J2_kg_m2=0.0266")
-    made.add_argument('--drift', metavar='KEY', action='append', default=[],
-                      help='a factor that may differ from log to log: brake_torque')
-    made.add_argument('--form', choices=('auto', *FORMS), default='auto',
-                      help='form of the plant; auto takes the one that better predicts left-out logs [auto]')
-    made.add_argument('--validate', metavar='FOLDER', help='run folder, not among the logs, whose stop is predicted')
-    made.add_argument('--out', metavar='DIR', type=pathlib.Path, default=pathlib.Path('identified'),
-                      help='folder for model.toml, identified.json and report.html [identified]')
-    made.add_argument('--force', action='store_true', help='replace existing files')
-    made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the bootstrap [1]')
-    made.add_argument('--no-report', action='store_true', help='write no page, and advise nothing')
-    made.add_argument('--version', action='version', version=_core.version)
-    return made
-
-
 def _fixed(texts: list[str]) -> dict[str, float | None]:
     fixed: dict[str, float | None] = {}
     for text in texts:
@@ -163,14 +139,14 @@ def _identify(o: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    o = parser().parse_args(arguments)
+    o = parsers.identify().parse_args(arguments)
     made = [folder for folder in (o.out, *o.out.parents) if not folder.exists()]
     try:
         return _identify(o)
     except Unavailable as error:
         return failed('abs_identify', f'{error}; --no-report leaves the page out', 3)
     except (ValueError, OSError) as error:
-        return failed('abs_identify', clean(error, 4000))
+        return failed('abs_identify', error if misfit(error) else clean(error, 4000))
     except KeyboardInterrupt:
         return failed('abs_identify', 'interrupted; nothing is written', INTERRUPTED)
     finally:

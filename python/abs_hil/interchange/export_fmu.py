@@ -1,12 +1,12 @@
 """abs_hil export-fmu: the simulated rig, or with --controller a slip controller, as an FMU for co-simulation
 (docs/interchange.md)."""
-import argparse
 import pathlib
 import zipfile
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from .. import parsers
 from ..core import _core
 from ..files import refuse_existing, write_whole
 from ..options import failed
@@ -134,25 +134,8 @@ def write(model: dict[str, Any], fmi: int, path: pathlib.Path) -> list[str]:
     return [folder for folder, _, _ in libraries]
 
 
-def parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser('abs_hil export-fmu', allow_abbrev=False, description='Writes the simulated rig, or with '
-                                '--controller a slip controller, as an FMU for other tools (docs/interchange.md)')
-    p.add_argument('--config', metavar='FILE', help='TOML file with any configuration values')
-    p.add_argument('--plant', metavar='NAME|FILE', help='simulated plant by name or TOML file')
-    p.add_argument('--model', metavar='NAME|FILE', help="the controllers' model of the rig, by name or TOML file (default: the "
-                   'plant)')
-    p.add_argument('--controller', metavar='NAME', help='export this slip controller')
-    p.add_argument('--set', metavar='KEY=VALUE', action='append', help='set any configuration value (abs_hil list --keys); may be '
-                   'repeated')
-    p.add_argument('--fmi', metavar='N', type=int, default=2, help='version of FMI, 2 or 3 [%(default)s]')
-    p.add_argument('--out', metavar='FILE.fmu', type=pathlib.Path, required=True, help='file to write')
-    p.add_argument('--force', action='store_true', help='replace an existing file')
-    p.add_argument('--version', action='version', version=_core.version)
-    return p
-
-
 def main(arguments: list[str]) -> int:
-    o = parser().parse_args(arguments)
+    o = parsers.export_fmu().parse_args(arguments)
     try:
         if o.fmi not in (2, 3):
             raise ValueError(f'--fmi {o.fmi}: give 2 or 3')

@@ -1,32 +1,17 @@
 """abs_convert: runs as files for other tools. `abs_hil convert` starts it for OUT.mcap and OUT.parquet."""
-import argparse
 import pathlib
 import signal
 from typing import Any
 
+from .. import parsers
 from ..files import write_whole
 from ..options import failed
-from ..places import how_to_install
 
 TARGETS = ('.mcap', '.parquet')
 
 
-def parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser(
-        prog='abs_convert', description='Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and '
-        'others (docs/interchange.md). Between event logs and CSV: abs_hil convert.')
-    p.add_argument('input', nargs='?', metavar='IN', help='run folder, event log (.lcmlog) or CSV')
-    p.add_argument('output', metavar='OUT', help='file to write: .mcap or .parquet')
-    p.add_argument('--live', metavar='URL', help='record a running experiment from this LCM network; "" is the default one')
-    p.add_argument('--prefix', default='ABS_', help='its telemetry.channel_prefix (default: %(default)s)')
-    p.add_argument('--idle', type=float, metavar='S', help='with --live: end S seconds after the last message')
-    p.add_argument('--seconds', type=float, metavar='S', help='with --live: end after S seconds')
-    return p
-
-
 def main(arguments: list[str]) -> int:
-    p = parser()
-    given = p.parse_args(arguments)
+    given = parsers.convert().parse_args(arguments)
     output = pathlib.Path(given.output)
     try:
         if output.suffix not in TARGETS:
@@ -39,10 +24,8 @@ def main(arguments: list[str]) -> int:
             raise ValueError('--live writes .mcap only; convert that run\'s folder or log to .parquet afterwards')
         print(_record(given, output) if given.live is not None else _convert(given.input, output))
         return 0
-    except ImportError as error:
-        return failed('abs_convert', f'{error}: install it: {how_to_install(error.name or "mcap")}', 3)
     except (ValueError, OSError) as error:
-        return failed('abs_convert', error, 3 if isinstance(error, OSError) else 2)
+        return failed('abs_convert', error, 2 if isinstance(error, ValueError) else 3)
 
 
 def _convert(path: str, output: pathlib.Path) -> str:

@@ -2,18 +2,18 @@
 
 One HTML file: the simulation core as WebAssembly, uPlot, and the page's own scripts.
 """
-import argparse
 import json
 import pathlib
 from collections.abc import Sequence
 from typing import Any
 
+from .. import parsers
 from ..core import _core
 from ..files import write_text
 from ..options import failed
-from ..places import CHARTS_SCRIPT, CHARTS_STYLE, charts
-from ..report.page import Unavailable, standalone
-from .exercise import find, known, read
+from ..places import CHARTS_SCRIPT, CHARTS_STYLE, Unavailable, charts
+from ..report.page import standalone
+from .exercise import find, read
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
 #: in this order one script
@@ -47,16 +47,11 @@ def page(exercise: dict[str, Any] | None) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog='abs_hil lab', allow_abbrev=False, description=(__doc__ or '').split(' (docs')[0] + '.')
-    parser.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('lab.html'), help='the page (lab.html)')
-    parser.add_argument('--exercise', metavar='FILE',
-                        help='a TOML file that says what the page asks, hides and offers; or one that is ready: '
-                             + ', '.join(path.stem for path in known()))
-    given = parser.parse_args(arguments)
+    given = parsers.lab().parse_args(arguments)
     try:
         text = page(None if given.exercise is None else read(find(given.exercise)))
         write_text(given.out, text)
-    except (ValueError, Unavailable, ImportError) as error:
+    except ValueError as error:
         return failed('abs_hil lab', error)
     print(f'{given.out}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser')
     return 0

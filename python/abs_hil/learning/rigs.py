@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, Value, options
+from ..parsers import VARY
 
 #: names of an observation's numbers, with units
 OBSERVATION = ('slip_est', 'slip_ref', 'v_x_est_m_s', 'alpha1_rad_s2', 'alpha2_rad_s2', 'brake_torque_est', 'action_before')
@@ -36,7 +37,7 @@ class Task:
     """
     plant: PathLike = 'paper-timing'
     set: Mapping[str, Value] = field(default_factory=dict)
-    vary: str = 'parameters=0.1,theta=0.1,phase'
+    vary: str = VARY
     randomise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     period_s: float = 0.01
     start_speed_rad_s: float = 170.0

@@ -1,5 +1,4 @@
 """abs_learn: a small learner, from scratch: the cross-entropy method over a controller of nine numbers (docs/learning.md)."""
-import argparse
 import json
 import pathlib
 import sys
@@ -9,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from ..core import _core
+from .. import parsers
 from ..files import write_text, write_whole
-from ..options import failed, whole
+from ..options import failed
 from .rigs import TRAINING_SEED, Rigs, Task
 
 #: plants on which nobody trains
@@ -94,20 +93,6 @@ def judge(task: Task, policy: Policy | None, law: str, plants: int) -> np.ndarra
     return returns(Rigs(plants, task, seed=JUDGING_SEED, law=law), policy, 0)
 
 
-def parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser('abs_learn', allow_abbrev=False, description='Trains a small controller in simulation by '
-                                   'trial and error, and compares it with laws of the program (docs/learning.md)')
-    made.add_argument('--plant', metavar='NAME|FILE', default='paper-timing', help='nominal plant [paper-timing]')
-    made.add_argument('--vary', metavar='SPEC', default=Task.vary, help=f'what varies between episodes [{Task.vary}]')
-    made.add_argument('--generations', metavar='N', type=whole(1, 10**6), default=60, help='generations of the search [60]')
-    made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the search [1]')
-    made.add_argument('--judge', metavar='N', type=whole(1, 10**6), default=100, help='plants on which the result is judged [100]')
-    made.add_argument('--output', metavar='FILE', type=pathlib.Path, help='write the weights and the curve as JSON')
-    made.add_argument('--figure', metavar='FILE', type=pathlib.Path, help='draw the learning curve (SVG, PDF or PNG)')
-    made.add_argument('--version', action='version', version=_core.version)
-    return made
-
-
 def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[str, float]) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -129,12 +114,14 @@ def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[
 
 
 def main(arguments: list[str]) -> int:
-    o = parser().parse_args(arguments)
+    o = parsers.learn().parse_args(arguments)
     try:
         if o.figure and o.figure.suffix not in ('', '.svg', '.pdf', '.png'):
             raise ValueError(f'--figure {o.figure}: give a file .svg, .pdf or .png')
         for path in filter(None, (o.output, o.figure)):  # no training for a result that would be lost
             write_whole(path, lambda name: None, probe=True)
+        if o.figure:
+            import matplotlib.figure  # noqa: F401
         task = Task(plant=o.plant, vary=o.vary)
 
         def progress(generation: int, reward: float) -> None:

@@ -18,8 +18,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     try:
         from . import NoOptimum, drive, optimum
-    except ModuleNotFoundError as error:
-        return failed('abs_hil.optimum', f'{error}; pip install casadi', 3)
+    except ImportError as error:
+        return failed('abs_hil.optimum', error, 3)
     try:
         values = {}
         for text in given.set:

@@ -8,13 +8,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..places import how_to_install
+from ..places import Unavailable, how_to_install
 from ..rows import TEXTS, read_rows
 from ..run import csv_bytes
 from .files import RunFiles
-from .page import Unavailable
 
-FORMATS = ('csv', 'json', 'octave', 'parquet')
 _FIELD_CHARACTERS = 63  # of names in Octave and MATLAB
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..places import Unavailable, how_to_install
 from .model import Figure
 from .plots import packed, plot
 from .text import significant
@@ -21,10 +22,6 @@ MOST_TOLD = 12  # curves of a panel in its text alternative
 MOST_BESIDE = 3  # runs whose figures of merit stand beside the first figure
 
 
-class Unavailable(RuntimeError):
-    """A part that this computer lacks; the message says how to install it."""
-
-
 def plotly_js() -> str:
     """The source of plotly.js: of the Python package plotly, or the copy that a Debian package brings."""
     places = [_FOLDER / 'plotly.min.js']
@@ -34,8 +31,7 @@ def plotly_js() -> str:
     for place in places:
         if place.exists():
             return place.read_text(encoding='utf-8')
-    raise Unavailable('plotly.js, which the page shows its figures with, is missing; install it: pip install plotly, or '
-                      'scripts/setup_python.sh python-packages.txt in the source folder')
+    raise Unavailable(f'plotly.js, which the page shows its figures with, is missing; install it: {how_to_install("plotly")}')
 
 
 def standalone(template: str, folders: list[pathlib.Path], data: dict[str, bytes], scripts: list[str], css: str, *,

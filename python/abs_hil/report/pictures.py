@@ -7,7 +7,6 @@ from typing import Any
 from ..files import refuse_existing, write_whole
 from .model import Curve, Figure, Panel, phase_colour
 
-FORMATS = ('pdf', 'png', 'svg')
 WIDTH_IN = 7.2
 PX_PER_IN = 110.0
 DPI = 160

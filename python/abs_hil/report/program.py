@@ -8,17 +8,19 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from .. import parsers
 from ..core import _core
 from ..files import refuse_existing, write_text, write_whole
 from ..options import failed
+from ..parsers import EXPORTS
+from ..places import misfit
 from ..simulation import progress_shown
 from . import paper, pictures, tables
-from .export import FORMATS as EXPORTS
 from .export import Exporter
 from .figures import Choice, Options, run_figures
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
-from .page import PAGE_MARK, Unavailable, page
+from .page import PAGE_MARK, page
 from .series import SeriesStudy, group_table, series_figure, series_table, study
 from .survey import Survey
 from .tables import Table, merits
@@ -87,40 +89,6 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
              'notes': tables.all_notes(runs, surveys, found.notes)}
     every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
     return runs, surveys, every, parts
-
-
-def parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser('abs_report', description='Turns runs into a page with figures and tables, a plain table, '
-                                   'or exports their rows', allow_abbrev=False)
-    made._negative_number_matcher = re.compile(r'-[\d.]')  # --window -5:1 has a value
-    made.add_argument('runs', metavar='RUN', nargs='+',
-                      help='run folders, series folders, CSV files of runs; or the folder of a study')
-    made.add_argument('--version', action='version', version=_core.version)
-    made.add_argument('--output', metavar='FILE', default='',
-                      help='file of the page (default: report.html) or of the exported rows (default: stdout)')
-    made.add_argument('--force', action='store_true', help='replace existing files')
-    made.add_argument('--title', metavar='TEXT', default='', help='heading of the page')
-    made.add_argument('--label', metavar='TEXT', dest='labels', action='append', default=[],
-                      help='name of each run in legends and tables, one per run')
-    made.add_argument('--window', default='brake', metavar='brake|run|FROM:TO',
-                      help='time range of the figures: brake, run, or FROM:TO in seconds of the run [brake]')
-    made.add_argument('--metric', metavar='A,B', dest='metrics', action='append', default=[],
-                      help='of a study: the metrics whose curves and maps the page shows')
-    made.add_argument('--paper', action='store_true',
-                      help="make the paper's comparison page from an adaptive and a sliding-mode run")
-    made.add_argument('--figures', metavar='DIR', default='', help='folder for the figures as separate files')
-    made.add_argument('--format', choices=pictures.FORMATS, default=None, help='format of these files [svg]')
-    made.add_argument('--table', action='store_true', help='print the figures of merit as a plain table; makes no page')
-    made.add_argument('--merits', metavar='FILE', default='',
-                      help='write the figures of merit as CSV, one row a run, numbers in full')
-    exports = made.add_argument_group('export', 'export rows instead of a page, to --output or stdout')
-    one = exports.add_mutually_exclusive_group()
-    for kind, what in zip(EXPORTS, ("all runs in one CSV, with the run's name in the first column", 'runs with summaries, one '
-                                    'array per column', 'MAT-file for Octave, MATLAB, SciPy', 'Parquet file')):
-        one.add_argument(f'--{kind}', dest='export', action='store_const', const=kind, help=what)
-    made.add_argument('--columns', metavar='A,B', action='append', default=[],
-                      help='columns to export, separated by commas (default: all)')
-    return made
 
 
 def _choice(text: str) -> Choice:
@@ -225,7 +193,7 @@ def _report_study(o: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    o = parser().parse_args(arguments)
+    o = parsers.report().parse_args(arguments)
     of_study = any((pathlib.Path(run) / 'study.json').exists() or run.endswith('results.csv.gz') for run in o.runs)
     columns = [name for names in o.columns for name in names.split(',') if name]
     try:
@@ -247,8 +215,6 @@ def main(arguments: list[str]) -> int:
             _export(o, columns)
         else:
             _report(o)
-    except Unavailable as error:
-        return failed('abs_report', error, 3)
     except (ValueError, OSError) as error:
-        return failed('abs_report', clean(error, 4000))
+        return failed('abs_report', error if misfit(error) else clean(error, 4000))
     return 0

@@ -5,6 +5,7 @@ from typing import Any
 from ..interchange import messages
 from ..interchange.recorded import EVENT_TOPIC
 from ..interchange.running import Translator
+from ..places import how_to_install
 
 #: the protocol knows no token, so other computers get in by ssh only
 HOST = '127.0.0.1'
@@ -34,8 +35,8 @@ class Channels(messages.Topics):
         try:
             import foxglove
         except ImportError as error:
-            raise ImportError(f'--foxglove needs the Python package foxglove-sdk ({error}): pip install foxglove-sdk, or '
-                              'scripts/setup_python.sh in the source folder') from None
+            raise ImportError(f'--foxglove needs the Python package foxglove-sdk ({error}); install it: '
+                              f'{how_to_install("foxglove-sdk")}') from None
         super().__init__()
         self._package: Any = foxglove
         self._context: Any = foxglove.Context()

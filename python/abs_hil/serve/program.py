@@ -1,50 +1,23 @@
 """The command line of abs_serve; `abs_hil serve` starts it."""
-import argparse
 import asyncio
 import pathlib
 import secrets
 import signal
 from typing import Any
 
+from .. import parsers
 from ..core import load_network
 from ..options import failed
 from .feed import Feed, Live, Played
 from .runs import BIN_S, History
 from .server import Command, Server, is_loopback
 
-PORT, FOXGLOVE_PORT = 8265, 8765
 COMMANDS = ('stop', 'start', 'continue', 'slip-ref', 'gain')
 ANSWER_S = 3.0
 
 
-def parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser(
-        prog='abs_serve', allow_abbrev=False, description='Shows a running experiment, or a recorded one, as a scope in the '
-        'browser (docs/serve.md). It only watches unless --commands is given.')
-    p.add_argument('log', nargs='?', metavar='LOG', help='event log (.lcmlog), or a run folder that has one, to play instead of '
-                   'receiving')
-    p.add_argument('--speed', type=float, default=1.0, metavar='X', help='with LOG: times as fast as recorded; 0: at once '
-                   '(default: %(default)g)')
-    p.add_argument('--lcm-url', default='', metavar='URL', help="the LCM network (default: the run's own default)")
-    p.add_argument('--prefix', default='ABS_', help="the run's telemetry.channel_prefix (default: %(default)s)")
-    p.add_argument('--host', default='127.0.0.1', help='address to listen at; other than this computer\'s own, the link has a '
-                   'token (default: %(default)s)')
-    p.add_argument('--port', type=int, default=PORT, help='port to listen at; 0: any free one (default: %(default)d)')
-    p.add_argument('--commands', metavar='KEYFILE', help='the page may send what `abs_hil send` may, with this key '
-                   '(commands.key_file of the run); the link has a token')
-    p.add_argument('--foxglove', nargs='?', const=FOXGLOVE_PORT, type=_port, metavar='PORT', help='serve Foxglove, Lichtblick '
-                   'and PlotJuggler too (foxglove.sdk.v1), always at 127.0.0.1 (default: %(const)d; 0: any free one)')
-    return p
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f'"{text}" is no number in [0, 65535]; LOG stands before --foxglove')
-    return int(text)
-
-
 def main(arguments: list[str]) -> int:
-    given = parser().parse_args(arguments)
+    given = parsers.serve().parse_args(arguments)
     try:
         source = _source(given)
         if given.commands is not None:

@@ -18,7 +18,7 @@ from aiohttp import web
 
 from ..messages import PHASES, QUANTITIES
 from ..nesting import parse_json
-from ..places import charts
+from ..places import charts, misfit
 from ..run import COLUMNS as CSV_COLUMNS
 from ..run import csv_bytes, phase_names
 from .feed import Feed
@@ -183,7 +183,7 @@ class Server:
             try:
                 file = await asyncio.get_running_loop().run_in_executor(None, file_of, kind, run, rows)
             except (ImportError, OSError) as error:  # no package, or no room
-                return refused(501, f'{error}. MCAP needs: pip install mcap')
+                return refused(501, misfit(error) or str(error))
         del rows  # some MB, which a slow download would keep
         name = f'abs_hil-run-{run.number}-{time.strftime("%Y%m%d-%H%M%S", time.localtime(run.began))}.{kind}'
         answer = web.StreamResponse(headers={**HEADERS, 'Content-Disposition': f'attachment; filename="{name}"',

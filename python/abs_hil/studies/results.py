@@ -172,7 +172,7 @@ class StudyResults:
         try:
             from SALib.analyze import sobol
         except ImportError:
-            raise ValueError(f"Sobol indices need SALib: {how_to_install(SALIB)}") from None
+            raise ImportError(f"Sobol indices need SALib; install it: {how_to_install(SALIB)}") from None
         rows = self.columns(['point', 'plant', 'experiment', 'controller', *self.levels, *(where or {}), metric])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
@@ -196,7 +196,7 @@ class StudyResults:
             import pyarrow
             from pyarrow import parquet
         except ImportError:
-            raise ValueError(f"Parquet needs pyarrow: {how_to_install(PYARROW)}") from None
+            raise ImportError(f"Parquet needs pyarrow; install it: {how_to_install(PYARROW)}") from None
         writer = None
         try:
             for frame in self.chunks():

@@ -1,5 +1,4 @@
 """abs_watch: a running experiment in this terminal, over LCM. `abs_hil watch` starts it (docs/watching.md)."""
-import argparse
 import contextlib
 import os
 import re
@@ -13,7 +12,8 @@ from collections.abc import Iterator
 from rich.console import Console, Group
 from rich.live import Live
 
-from ..core import _core, load_network
+from .. import parsers
+from ..core import load_network
 from ..messages import decode
 from ..options import failed
 from .screen import Screen, draw, one_line
@@ -24,21 +24,6 @@ DRAW_PERIOD_S = 0.2
 LINE_PERIOD_S = 1.0
 PICTURE = (100, 32)  # columns and rows of --once
 ENDING = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 143, signal.SIGQUIT: 131}
-
-
-def parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser('abs_watch', allow_abbrev=False, description='Shows a running experiment in this terminal, over '
-                                'LCM; q quits (docs/watching.md)')
-    p.add_argument('--lcm-url', default='', metavar='URL', help='LCM network (default: LCM_DEFAULT_URL, else UDP multicast)')
-    p.add_argument('--prefix', default='ABS_', help="the run's telemetry.channel_prefix [%(default)s]")
-    p.add_argument('--window', type=float, default=10.0, metavar='S', help='width of the plots, 1 to 60 s [%(default)g]')
-    p.add_argument('--ascii', action='store_true', help='use ASCII only, for a terminal that shows braille badly')
-    how = p.add_mutually_exclusive_group()
-    how.add_argument('--plain', action='store_true', help='print a line a second, no screen; always so without a terminal')
-    how.add_argument('--once', action='store_true', help='print one screen as text; exit status 3 if no message arrives')
-    p.add_argument('--timeout', type=float, metavar='S', help='longest wait of --once for messages, s [5]')
-    p.add_argument('--version', action='version', version=_core.version)
-    return p
 
 
 class Ended(Exception):
@@ -123,7 +108,7 @@ def one_picture(feed: Feed, screen: Screen, timeout_s: float) -> bool:
 
 
 def main(arguments: list[str]) -> int:
-    p = parser()
+    p = parsers.watch()
     o = p.parse_args(arguments)
     if not 1.0 <= o.window <= 60.0:
         p.error(f'--window {o.window:g}: must be in [1, 60] s')
