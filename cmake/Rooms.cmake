@@ -2,8 +2,8 @@
 # libraries, their include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made
 # from it. A room knows only rooms above it, so there is no circle.
 set(ABS_HIL_ROOM_TABLE
-  "files | the one writer of results: whole or not at all, and never in place of what is no regular file | "
   "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
+  "files | the one writer of results: whole or not at all, and never in place of what is no regular file | rig"
   "cli | options and subcommands of a program as rows, the only source that includes CLI11 | rig"
   "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"
   "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"

@@ -1,13 +1,11 @@
 // What ResultFile and FileError do alike on every platform: texts of errors, and writing in large pieces.
-#include <system_error>
-
 #include "files/result_file.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::files {
 
 FileError::FileError(std::string_view kind, const std::filesystem::path& path, int error_number)
-    : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
-                error_number) {}
+    : FileError(kind, path, rig::refusal(error_number, path, rig::writing), error_number) {}
 
 FileError::FileError(std::string_view kind, const std::filesystem::path& path, std::string_view why, int error_number)
     : std::runtime_error(

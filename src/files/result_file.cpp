@@ -13,6 +13,8 @@
 #include <system_error>
 #include <utility>
 
+#include "rig/error_words.hpp"
+
 namespace abs_hil::files {
 
 namespace fs = std::filesystem;
@@ -79,25 +81,6 @@ std::shared_ptr<void> claim(const std::string& kind, const fs::path& path, const
 
 }  // namespace
 
-std::string FileError::fix_for(const fs::path& path, int error_number) {
-  switch (error_number) {
-    case ENOENT: return "create the directory first: mkdir -p '" + folder_of(path) + "'";
-    case ENOTDIR: return "a part of the path is a file, not a directory: choose another path";
-    case EISDIR: return "this is a directory: add a file name";
-    case EACCES:
-    case EPERM: return "choose a place that you may write to, or get the right to write to '" + folder_of(path) + "'";
-    case EROFS: return "the file system is read-only: choose another place";
-    case ENOSPC:
-    case EDQUOT: return "free some space on that file system, or choose another";
-    case EFBIG: return "the file reached the size limit: raise it (ulimit -f), or log less";
-    case EMFILE:
-    case ENFILE: return "too many open files: raise the limit (ulimit -n)";
-    case ENAMETOOLONG: return "choose a shorter name: 255 bytes at most, 4095 with all its directories";
-    case ELOOP: return "its symbolic links lead in a circle: remove them";
-    default: return "choose another path";
-  }
-}
-
 void note_input(const fs::path& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error) && !fs::is_directory(path, error)) return;
@@ -120,9 +103,7 @@ ResultFile::~ResultFile() {
 
 void ResultFile::fail(int error_number) const {
   const fs::path& place = target_.empty() ? path_ : target_;  // behind a link
-  throw FileError(kind_, path_,
-                  std::generic_category().message(error_number) + "; " + FileError::fix_for(place, error_number),
-                  error_number);
+  throw FileError(kind_, path_, rig::refusal(error_number, place, rig::writing), error_number);
 }
 
 /// Opens a stream, or finds the place of the file.

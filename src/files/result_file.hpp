@@ -17,8 +17,6 @@ class FileError : public std::runtime_error {
   FileError(std::string_view kind, const std::filesystem::path& path, std::string_view why, int error_number);
 
   [[nodiscard]] int error_number() const noexcept { return error_number_; }
-  /// What a person can do against this error at `path`.
-  [[nodiscard]] static std::string fix_for(const std::filesystem::path& path, int error_number);
 
  private:
   int error_number_;

@@ -15,17 +15,6 @@ namespace abs_hil::files {
 
 namespace fs = std::filesystem;
 
-std::string FileError::fix_for(const fs::path& path, int error_number) {
-  const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
-  switch (error_number) {
-    case ENOENT: return "create the directory first: mkdir \"" + folder + '"';
-    case EISDIR: return "this is a directory: add a file name";
-    case EACCES: return "choose a place that you may write to, and close the file in other programs";
-    case ENOSPC: return "free some space on that drive, or choose another";
-    default: return "choose another path";
-  }
-}
-
 ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_folder)
     : path_(std::move(path)), kind_(std::move(kind)) {
   buffer_.reserve(buffer_bytes);
