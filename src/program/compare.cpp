@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 
 #include "config/config_error.hpp"
 #include "program/command_line.hpp"
@@ -11,6 +12,7 @@
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
+#include "run_folder/run_folder.hpp"
 #include "study/comparison.hpp"
 #include "study/parallel.hpp"
 
@@ -53,9 +55,15 @@ int record(const CompareOptions& options, const study::Study& study, const std::
                     options.repeat, options.repeat - 1));
   }
   int status = exit_completed;
+  std::set<std::string> names;
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     std::optional<std::string> folder = options.run_folder;
-    if (folder && contenders.size() > 1) *folder += '/' + rig::plain_name(contenders[c].name, "-_.=");
+    if (folder && contenders.size() > 1) {
+      constexpr std::size_t number_bytes = 12;
+      std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes);
+      while (!names.insert(name).second) name += fmt::format("-{}", c + 1);
+      *folder += '/' + name;
+    }
     status = std::max(status, record_run(study, repetition * contenders.size() + c, folder, command_line));
   }
   return status;
@@ -98,7 +106,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
   if (csv) csv->write(study::to_csv(table));
   if (markdown) markdown->write(study::to_markdown(table));
   if (runs_file) runs_file->write(study::runs_csv(study, runs));
-  fmt::print("{}", study::to_text(table));
+  cli::print("{}", study::to_text(table));
   return exit_completed;
 }
 

@@ -20,6 +20,7 @@
 
 #include "abs_hil_revision.hpp"
 #include "files/result_file.hpp"
+#include "rig/error_words.hpp"
 #include "run_folder/sha256.hpp"
 
 namespace abs_hil::run_folder {
@@ -67,8 +68,8 @@ RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
   }
   fs::create_directories(path_, error);
   if (error) {
-    throw FolderError(fmt::format("--out: cannot create \"{}\": {}; give a folder in a writable directory",
-                                  path_.string(), error.message()));
+    throw FolderError(fmt::format("--out: cannot create \"{}\": {}", path_.string(),
+                                  rig::refusal(error.value(), path_, rig::writing)));
   }
   if (!fs::is_empty(path_, error) || error) {
     throw FolderError(fmt::format("--out: \"{}\" is not empty, and nothing is overwritten; give a new or empty folder",
@@ -126,20 +127,6 @@ fs::path default_runs_dir() {
   return given != nullptr ? fs::path(given) : fs::path("runs");
 }
 
-fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::string_view experiment) {
-  // A script's path becomes its name; characters unfit for a file name become dashes.
-  std::string name = fs::path(experiment).stem().string();
-  for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-    if (!plain) c = '-';
-  }
-  const std::string base = fmt::format("{:%Y%m%d-%H%M%S}-{}", local_time, name);
-  fs::path path = parent / base;
-  std::error_code error;
-  for (int i = 2; fs::exists(path, error); ++i) path = parent / fmt::format("{}-{}", base, i);
-  return path;
-}
-
 std::string sha256_of_file(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream file(path, std::ios::binary);
@@ -150,7 +137,8 @@ std::string sha256_of_file(const std::filesystem::path& path) {
     sum.add({block.data(), static_cast<std::size_t>(file.gcount())});
   }
   if (!file.eof()) {
-    throw FolderError(fmt::format("cannot read \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
+    throw FolderError(fmt::format("cannot read \"{}\": {}", path.string(),
+                                  rig::refusal(errno != 0 ? errno : EIO, path, rig::reading)));
   }
   return sum.hex();
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "rig/error_words.hpp"
 #include "rig/parse_json.hpp"
 
 namespace abs_hil::run_folder {
@@ -20,7 +21,8 @@ void move_to(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::rename(from, to, error);
   if (error) {
-    throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(), error.message()));
+    throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(),
+                                  rig::refusal(error.value(), to, rig::writing)));
   }
 }
 

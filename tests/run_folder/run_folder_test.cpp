@@ -83,6 +83,47 @@ TEST_CASE("folders are named by time and experiment, and never taken twice") {
   time.tm_sec = 9;
   const fs::path first = unused_folder(place.path, time, "labs/ice run.toml");
   CHECK(first == place.path / "20261121-130409-ice-run");
-  fs::create_directory(first);
+  CHECK(fs::is_directory(first));  // made at once, so that no other program takes it in the same second
   CHECK(unused_folder(place.path, time, "ice run") == place.path / "20261121-130409-ice-run-2");
+  CHECK(unused_folder(place.path, time, "v1.5 of it").filename() == "20261121-130409-v1.5-of-it");
+  for (const std::string& name : {std::string(400, 'x'), std::string(400, 'x'), std::string("x.toml")}) {
+    const fs::path made = unused_folder(place.path, time, name);
+    CHECK(fs::is_directory(made));
+    CHECK(made.filename().string().size() <= 255);
+  }
+}
+
+TEST_CASE("names of folders keep their letters") {
+  const TemporaryFolder place;
+  const auto name = [&](std::string_view text) { return folder_name(text, place.path); };
+  CHECK(name("paper") == "paper");
+  CHECK(name("Übergang, nasse Straße") == "Ubergang-nasse-Strasse");
+  CHECK(name("Brémond à l'été") == "Bremond-a-l-ete");
+  CHECK(name("Łódź ø æ Œ ğ ş ı ậ") == "Lodz-o-ae-OE-g-s-i-ậ");
+  CHECK(name("µ-split") == "m-split");
+  CHECK(name("a\u0308o\u0308") == "ao");  // with the mark as a character of its own
+  CHECK(name("λ=0.2") == "l=0.2");
+  CHECK(name("Ελλάδα") == "Ellada");
+  CHECK(name("опыт, Ёж, Київ, объём") == "opyt-Yozh-Kiyiv-obyom");
+  CHECK(name("制动 1") == "制动-1");
+  CHECK(name("a/b\\c:d*e?f\"g<h>i|j\nk") == "a-b-c-d-e-f-g-h-i-j-k");
+  CHECK(name("..") == "unnamed");
+  CHECK(name("") == "unnamed");
+  CHECK(name("🚗") == "unnamed");
+  CHECK(name("\xff\xfe" "abc") == "c");  // no UTF-8
+  CHECK(name("\u202Ea\u200Bb") == "a-b");
+}
+
+TEST_CASE("names of folders end at a character, within what the file system takes") {
+  const TemporaryFolder place;
+  for (const std::size_t spare : {0, 1, 2, 3, 40}) {
+    std::string text;
+    while (text.size() < 600) text += "动";
+    const std::string name = folder_name(text, place.path, spare);
+    CHECK(name.size() <= 255 - spare);
+    CHECK(name.size() > 255 - spare - 3);
+    CHECK(name.size() % 3 == 0);
+    CHECK(fs::create_directory(place.path / name));
+    fs::remove(place.path / name);
+  }
 }
