@@ -11,12 +11,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
 
 void say(const std::string& text) {
-  fmt::print("{}\n", text);
+  cli::print("{}\n", text);
   std::fflush(stdout);
 }
 
@@ -58,11 +59,12 @@ void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* cha
 ControlFifo::ControlFifo(const std::string& path) {
   if (path.empty()) return;
   if (::mkfifo(path.c_str(), 0600) != 0 && errno != EEXIST) {
-    throw std::runtime_error(path + ": cannot create the FIFO: " + std::strerror(errno));
+    throw std::runtime_error(path + ": cannot create the FIFO: " + rig::refusal(errno, path, rig::writing));
   }
   // Open it for writing, too: otherwise it reports end of file whenever it has no writer.
   fifo_ = driver::FileDescriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
-  if (fifo_.get() < 0) throw std::runtime_error(path + ": cannot open the FIFO: " + std::strerror(errno));
+  if (fifo_.get() < 0)
+    throw std::runtime_error(path + ": cannot open the FIFO: " + rig::refusal(errno, path, rig::writing));
 }
 
 void ControlFifo::take(const Obey& obey) {
@@ -84,7 +86,8 @@ void OutputFile::begin(const std::string& file) {
   end();
   if (file == "off") return;
   open(name_ = file);
-  if (!is_open()) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
+  if (!is_open())
+    throw std::runtime_error("cannot write \"" + file + "\": " + rig::refusal(errno, file, rig::writing));
 }
 
 void OutputFile::end() {
@@ -92,7 +95,7 @@ void OutputFile::end() {
   close();
   if (good()) return;
   any_lost_ = true;
-  fmt::print(stderr, "abs_rig_emulator: \"{}\" is incomplete: a write failed; is the disk full?\n", name_);
+  cli::print(stderr, "abs_rig_emulator: \"{}\" is incomplete: a write failed; is the disk full?\n", name_);
   clear();
 }
 

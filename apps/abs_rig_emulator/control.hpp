@@ -17,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cli/command_line.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
 #include "emulator/card_model.hpp"

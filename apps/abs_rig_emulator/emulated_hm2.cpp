@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "control.hpp"
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {
@@ -98,8 +99,7 @@ class EmulatedHm2 final : public EmulatedBoard {
         time_(options_.lock_step, options.truth_file) {
     if (socket_.get() < 0 ||
         ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address_), sizeof address_) != 0) {
-      throw std::runtime_error(address_text_ + ": " + std::strerror(errno) +
-                               "; give an address of this computer and a port that no program uses");
+      throw std::runtime_error(address_text_ + ": " + rig::refusal(errno, address_text_, rig::reaching));
     }
   }
 

@@ -166,7 +166,7 @@ class EmulatedUsb final : public EmulatedBoard {
       brake_since_ns_ = board_.time_ns();
     } else if (board_.time_ns() - brake_since_ns_ >= mid_braking_ns) {
       for (const std::string& command : std::exchange(options_.when_braking, {})) {
-        fmt::print("while braking: {}: {}\n", command, obey(command));
+        cli::print("while braking: {}: {}\n", command, obey(command));
       }
       std::fflush(stdout);
     }

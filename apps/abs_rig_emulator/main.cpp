@@ -223,7 +223,7 @@ int main(int argc, char** argv) {
   try {
     return cli::with_stdout("abs_rig_emulator", run(argc, argv));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "abs_rig_emulator: {}\n", error.what());
+    cli::print(stderr, "abs_rig_emulator: {}\n", error.what());
     const bool wrong_input = dynamic_cast<const config::ConfigError*>(&error) != nullptr ||
                              dynamic_cast<const std::invalid_argument*>(&error) != nullptr;
     return wrong_input ? 2 : 3;

@@ -9,16 +9,18 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <iostream>
 #include <type_traits>
 
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::cli {
 
 namespace {
+
+int why_lost = 0;  ///< errno of the first write to stdout that failed
 
 bool is_integer(const Target& target) {
   return std::visit([](auto* to) { return std::is_integral_v<std::remove_pointer_t<decltype(to)>>; }, target);
@@ -139,14 +141,18 @@ std::vector<std::string> Parser::given() const {
   return names;
 }
 
+void put(std::FILE* stream, std::string_view text) noexcept {
+  const bool whole = std::fwrite(text.data(), 1, text.size(), stream) == text.size();
+  if (!whole && stream == stdout && why_lost == 0) why_lost = errno;
+}
+
 int with_stdout(const char* program, int status) {
-  errno = 0;
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
-  const int why = errno;
+  if (std::fflush(stdout) != 0 && why_lost == 0) why_lost = errno;
+  if (why_lost == 0 && std::ferror(stdout) == 0) return status;
   pollfd output{STDOUT_FILENO, POLLOUT, 0};
   if (::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0) return status;
-  std::fprintf(stderr, "%s: cannot write to standard output%s%s\n", program, why != 0 ? ": " : "",
-               why != 0 ? std::strerror(why) : "");
+  std::fprintf(stderr, "%s: cannot write to standard output%s%s\n", program, why_lost != 0 ? ": " : "",
+               why_lost != 0 ? rig::refusal(why_lost, "", rig::writing).c_str() : "");
   return status == 0 ? 1 : status;
 }
 

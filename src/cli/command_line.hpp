@@ -1,10 +1,14 @@
 // A program's command line as rows of options.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -92,6 +96,18 @@ class Parser {
 
   std::shared_ptr<CLI::App> app_{};
 };
+
+/// Writes to stdout or stderr. Never throws, since a reader such as `head` may end early; with_stdout tells lost
+/// results.
+void put(std::FILE* stream, std::string_view text) noexcept;
+template <typename... Values>
+void print(std::FILE* stream, fmt::format_string<Values...> text, Values&&... values) {
+  put(stream, fmt::format(text, std::forward<Values>(values)...));
+}
+template <typename... Values>
+void print(fmt::format_string<Values...> text, Values&&... values) {
+  put(stdout, fmt::format(text, std::forward<Values>(values)...));
+}
 
 /// Flushes standard output at the end of a program. Results that did not reach it are lost data: a message on stderr,
 /// and 1 in place of status 0. A reader or a terminal that has gone wanted no more.

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "config/config_error.hpp"
+#include "rig/error_words.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::commands {
@@ -61,7 +62,9 @@ std::string read_key(const std::filesystem::path& file) {
   }
   struct stat facts {};
   if (::stat(file.c_str(), &facts) != 0) {
-    refuse(file, std::string("cannot be read: ") + std::strerror(errno) + make_one);
+    const int why = errno;
+    refuse(file, "cannot be read: " +
+                     (why == ENOENT ? std::strerror(why) + make_one : rig::refusal(why, file, rig::reading)));
   }
   if (!S_ISREG(facts.st_mode)) refuse(file, "is not a regular file" + make_one);
   if ((facts.st_mode & S_IRWXO) != 0) refuse(file, "is accessible to all users: chmod o= " + file.string());

@@ -12,6 +12,7 @@
 
 #include "config/config_error.hpp"
 #include "config/reader.hpp"
+#include "rig/error_words.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 
@@ -29,7 +30,9 @@ toml::table parse(const fs::path& file) {
   }
   try {
     std::ifstream in(file, std::ios::binary);
-    if (!in) throw ConfigError(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
+    if (!in)
+      throw ConfigError(
+          fmt::format("{}: cannot be read: {}", file.string(), rig::refusal(errno, file, rig::reading)));
     return rig::parse_toml(in, file.string());
   } catch (const toml::parse_error& problem) {
     throw ConfigError(

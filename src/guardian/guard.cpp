@@ -2,7 +2,6 @@
 #include "guardian/guard.hpp"
 
 #include <fcntl.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,14 +12,15 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/spawn.hpp"
 #include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
 #include "telemetry/flight_record.hpp"
@@ -32,7 +32,9 @@ namespace {
 constexpr int ready_within_ms = 5000;
 constexpr int ends_within_ms = 500;
 
-[[noreturn]] void refuse_for(const std::string& what, int error) { refuse_run(what + ": " + std::strerror(error)); }
+[[noreturn]] void refuse_for(const std::string& what, int error, const std::filesystem::path& program = {}) {
+  refuse_run(what + ": " + rig::refusal(error, program, rig::starting));
+}
 
 /// A copy numbered above the descriptors that the child inherits.
 driver::FileDescriptor high_copy(int fd) {
@@ -45,32 +47,6 @@ driver::FileDescriptor high_copy(int fd) {
 driver::FileDescriptor high_copy(driver::FileDescriptor fd) {
   if (fd.get() < 0) refuse_for("cannot open a file descriptor for it", errno);
   return high_copy(fd.get());
-}
-
-/// Starts a program in a session of its own, with default signals and these descriptors only: those here by those
-/// there. Returns 0, or an errno.
-int spawn(pid_t& pid, const std::string& program, std::initializer_list<std::pair<int, int>> files) {
-  posix_spawn_file_actions_t actions{};
-  posix_spawnattr_t attributes{};
-  posix_spawn_file_actions_init(&actions);
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigset_t all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  for (const auto& [from, to] : files) posix_spawn_file_actions_adddup2(&actions, from, to);
-  posix_spawn_file_actions_addclosefrom_np(&actions, inherited_guard_page + 1);
-  std::string name = program;
-  std::array<char*, 2> arguments{name.data(), nullptr};
-  const int error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  return error;
 }
 
 }  // namespace
@@ -207,16 +183,16 @@ void GuardianProcess::start() {
   const auto controller = high_copy(driver::FileDescriptor(open_pidfd(::getpid())));
   const auto launch_config = high_copy(driver::FileDescriptor(text_in_memory(launch_config_)));
 
-  const int error = spawn(pid_, program_,
-                          {{recorder.get(), inherited_recorder},
-                           {controller.get(), inherited_controller},
-                           {ready.get(), inherited_ready},
-                           {launch_config.get(), inherited_launch_config},
-                           {run_page.get(), inherited_run_page},
-                           {guard_page.get(), inherited_guard_page}});
+  const int error = driver::spawn(pid_, program_,
+                                  {{recorder.get(), inherited_recorder},
+                                   {controller.get(), inherited_controller},
+                                   {ready.get(), inherited_ready},
+                                   {launch_config.get(), inherited_launch_config},
+                                   {run_page.get(), inherited_run_page},
+                                   {guard_page.get(), inherited_guard_page}});
   if (error != 0) {
     pid_ = 0;
-    refuse_for("cannot start " + program_, error);
+    refuse_for("cannot start " + program_, error, program_);
   }
   process_ = driver::FileDescriptor(open_pidfd(pid_));
   if (process_.get() < 0) {

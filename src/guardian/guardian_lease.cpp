@@ -20,6 +20,7 @@
 #include "config/board_policy.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::guardian {
 
@@ -36,8 +37,8 @@ constexpr std::int64_t safe_within_ns = 300 * rig::ns_per_ms;
 
 std::string why_not(int error) {
   if (error == EAGAIN) return "its queue of visitors is full; end it and start it again";
-  return std::string(std::strerror(error)) +
-         (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket");
+  if (error == EACCES) return "Permission denied; join the group abs_hil and log in again";
+  return rig::refusal(error, "guardian.socket", rig::reaching);
 }
 
 std::optional<ServiceAnswer> call(const std::string& path, const LeaseMessage& message, std::int64_t within_ns) {

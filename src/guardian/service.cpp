@@ -34,6 +34,7 @@
 #include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
 #include "guardian/talker.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::guardian {
 
@@ -90,7 +91,7 @@ driver::FileDescriptor open_listener(const std::string& path) {
     refuse("is there and is no socket; choose another path");
   }
   driver::FileDescriptor listener(listen_at(path));
-  if (listener.get() < 0) refuse(std::strerror(errno));
+  if (listener.get() < 0) refuse(rig::refusal(errno, path, rig::writing));
   open_for_group(path);
   return listener;
 }

@@ -31,7 +31,7 @@ namespace {
 class Terminal final : public experiment::Dialog {
  public:
   void tell(const std::string& text) override {
-    fmt::print("{}\n", text);
+    cli::print("{}\n", text);
     std::fflush(stdout);
   }
   experiment::Answer ask(const std::string& question) override {

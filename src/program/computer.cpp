@@ -83,9 +83,9 @@ int doctor(const config::Settings& s, const std::string& only, bool json) {
         {"backend", s.backend}, {"well", well}, {"findings", diagnosis::to_json(findings)}};
     // Facts of the computer, as an environment variable, may hold any bytes.
     constexpr auto any_bytes = nlohmann::ordered_json::error_handler_t::replace;
-    fmt::print("{}\n", report.dump(2, ' ', false, any_bytes));
+    cli::print("{}\n", report.dump(2, ' ', false, any_bytes));
   } else {
-    fmt::print("{}", diagnosis::to_text(findings));
+    cli::print("{}", diagnosis::to_text(findings));
   }
   return well ? exit_completed : exit_unavailable;
 }
@@ -178,9 +178,9 @@ int latency(const LatencyOptions& options) {
                                        .timing = statistics.summary(),
                                        .wire = run.driver().answer_times()};
   if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
-  fmt::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
+  cli::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
   if (!options.json) {
-    for (const std::string& line : run.driver().tally()) fmt::print("{}\n", line);
+    for (const std::string& line : run.driver().tally()) cli::print("{}\n", line);
   }
   if (monitor) {
     run.release_driver();  // the guard reads the board back before it believes that the run is over

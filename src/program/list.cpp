@@ -79,12 +79,12 @@ Json reasons() {
   return rows;
 }
 
-void print(std::string_view name, std::string_view summary) { fmt::print("  {:<21} {}\n", name, summary); }
+void print(std::string_view name, std::string_view summary) { cli::print("  {:<21} {}\n", name, summary); }
 
 /// The controllers' own signals. They may depend on options, which are the defaults here.
 void list_signals() {
   const config::Settings settings;
-  fmt::print("signals (of a controller's own, beside the quantities of every run)\n");
+  cli::print("signals (of a controller's own, beside the quantities of every run)\n");
   for (const auto& entry : control::controllers()) {
     const auto controller = control::make_controller(entry.name, {settings.control, settings.model});
     const std::vector<std::string> names = rig::signal_names(controller->signals());
@@ -131,38 +131,38 @@ void list_keys() {
   for (const Json& row : rows) {
     const std::string unit = text_in(row, "unit");
     const std::string safety = text_in(row, "safety");
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", text_in(row, "name"), name_width, text_in(row, "value"), value_width,
+    cli::print("{:<{}}  {:<{}}  {}{}{}; {}{}\n", text_in(row, "name"), name_width, text_in(row, "value"), value_width,
                text_in(row, "valid"), unit.empty() ? "" : " ", unit, text_in(row, "meaning"),
                safety != rig::no_effect_on_safety.in_words("") ? fmt::format(" [{}]", safety) : "");
   }
 }
 
 void list_quantities() {
-  fmt::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
+  cli::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
   for (const Json& row : quantities()) {
-    fmt::print("{:<24}  {:<15}  {:>3}  {}\n", text_in(row, "name"), text_in(row, "unit"),
+    cli::print("{:<24}  {:<15}  {:>3}  {}\n", text_in(row, "name"), text_in(row, "unit"),
                row["csv_column"].is_null() ? "" : row["csv_column"].dump(), text_in(row, "meaning"));
   }
 }
 
 void list_reasons() {
-  fmt::print("{:>6}  {:<12}  {:<32}  {}\n", "number", "kind", "found again by replay", "reason");
+  cli::print("{:>6}  {:<12}  {:<32}  {}\n", "number", "kind", "found again by replay", "reason");
   for (const rig::ReasonRow& row : rig::reasons) {
-    fmt::print("{:>6}  {:<12}  {:<32}  {}\n", static_cast<std::uint16_t>(row.reason), rig::name_of(row.kind),
+    cli::print("{:>6}  {:<12}  {:<32}  {}\n", static_cast<std::uint16_t>(row.reason), rig::name_of(row.kind),
                rig::name_of(row.found_again), row.text);
   }
 }
 
 void list_names() {
-  fmt::print("controllers\n");
+  cli::print("controllers\n");
   for (const auto& entry : control::controllers()) print(entry.name, entry.summary);
-  fmt::print("plants\n");
+  cli::print("plants\n");
   for (const auto& entry : config::known_plants()) print(entry.name, entry.description);
-  fmt::print("experiments\n");
+  cli::print("experiments\n");
   for (const auto& script : config::known_experiments()) print(script->name, script->description);
-  fmt::print("backends\n");
+  cli::print("backends\n");
   for (const auto& entry : driver::backend_kinds()) print(entry.name, entry.summary);
-  fmt::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
+  cli::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
   for (const auto& entry : driver::registered_backends()) print(entry.name, entry.summary);
   list_signals();
 }
@@ -189,7 +189,7 @@ Action add_list(cli::Parser& parser, const Words&) {
       return parser.refuse("--json requires --keys, --quantities or --reasons");
     }
     if (o->json) {
-      fmt::print("{}\n", (o->quantities ? quantities() : o->reasons ? reasons() : keys()).dump(1));
+      cli::print("{}\n", (o->quantities ? quantities() : o->reasons ? reasons() : keys()).dump(1));
     } else if (o->quantities) {
       list_quantities();
     } else if (o->reasons) {

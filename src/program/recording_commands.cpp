@@ -48,9 +48,9 @@ struct ConvertCommand {
 
 int check_again(const replay::RecordedRun& run) {
   const replay::CheckResult result = replay::check(run);
-  for (const std::string& line : result.lines) fmt::print("{}\n", line);
+  for (const std::string& line : result.lines) cli::print("{}\n", line);
   if (result.equal) return exit_completed;
-  fmt::print(
+  cli::print(
       stderr,
       "abs_hil: the replayed commands differ from the recorded ones: the version or the computer is another, or the "
       "recording is damaged\n");
@@ -71,7 +71,7 @@ int replay_run(const ReplayCommand& command) {
   }
   const std::vector<replay::RerunCycle> rerun =
       replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
-  fmt::print("{}", replay::report(run, settings, rerun));
+  cli::print("{}", replay::report(run, settings, rerun));
   if (csv) {
     for (const replay::RerunCycle& cycle : rerun) csv->consume(cycle.record, cycle.distance_m);
     csv->finish();
@@ -92,9 +92,9 @@ int convert(const ConvertCommand& command) {
   const telemetry::ConversionCounts counts = telemetry::log_to_csv(from, command.to);
   note(counts.cut);
   if (!counts.lacks.empty()) spdlog::warn("'{}' lacks {}: another version wrote it", from, counts.lacks);
-  fmt::print("{} events", counts.events);
-  if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
-  fmt::print("\n");
+  cli::print("{} events", counts.events);
+  if (counts.raw > 0) cli::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
+  cli::print("\n");
   return exit_completed;
 }
 

@@ -29,6 +29,7 @@
 #include "program/run_outputs.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "rig/error_words.hpp"
 #include "run/run_summary.hpp"
 #include "runtime/record_pump.hpp"
 
@@ -153,7 +154,7 @@ class Questions {
       asked_ = latest.phase_index;
       // Enter pressed before the question was asked is no answer to it.
       if (terminal_) static_cast<void>(::tcflush(STDIN_FILENO, TCIFLUSH));
-      fmt::print(stderr, "\n{}{}\n", question, commands_ ? " (or: abs_hil send continue)" : "");
+      cli::print(stderr, "\n{}{}\n", question, commands_ ? " (or: abs_hil send continue)" : "");
       std::fflush(stderr);
     } else if (terminal_ && entered()) {
       static_cast<void>(run_.adjustments().put({.kind = experiment::Adjustment::Kind::answer}));
@@ -211,9 +212,8 @@ void require_own_guardian(const driver::DriverOptions& board) {
   static_cast<void>(driver::make_safe_state_writer(board));
   const std::string program = guardian::guardian_program();
   if (::access(program.c_str(), X_OK) == 0) return;
-  throw driver::Unavailable(
-      "guardian: " + program + ": " + std::strerror(errno) +
-      ": abs_hil needs its guardian to drive a rig; install abs_guardian in the folder of abs_hil");
+  throw driver::Unavailable("guardian: abs_hil needs its guardian to drive a rig: " + program + ": " +
+                            rig::refusal(errno, program, rig::starting));
 }
 
 /// Writes the run's files, reports how it ended, ends the guardian. Returns the exit status.

@@ -282,8 +282,8 @@ std::string words_about(const Seen& seen, const std::vector<BoardOwner>& owners,
 /// Prints, at most for a moment: somebody may hold the other end of a full pipe.
 bool print(std::string good, std::string bad) {
   auto printed = in_background([good = std::move(good), bad = std::move(bad)] {
-    fmt::print(stderr, "{}", bad);
-    fmt::print("{}", good);
+    cli::print(stderr, "{}", bad);
+    cli::print("{}", good);
     std::fflush(stdout);
   });
   return is_there(printed, written_out_within_ms);

@@ -45,7 +45,7 @@ int send(const SendOptions& options) {
                                                .key_file = s.commands.key_file,
                                                .timeout_s = options.timeout_s});
   if (reply.outcome == commands::Outcome::accepted) {
-    fmt::print("{}\n", reply.message);
+    cli::print("{}\n", reply.message);
     if (!reply.authentic) {
       spdlog::warn(
           "this answer is not authenticated: anybody on the network could have sent it; give the run and send the "
@@ -53,7 +53,7 @@ int send(const SendOptions& options) {
     }
     return exit_completed;
   }
-  fmt::print(stderr, "abs_hil: {}\n", reply.message);
+  cli::print(stderr, "abs_hil: {}\n", reply.message);
   return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;
 }
 

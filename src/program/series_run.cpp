@@ -48,7 +48,7 @@ class Progress {
     const auto now = Clock::now();
     if (!terminal_ || (!phase.empty() && !at_once && now - shown_ < std::chrono::milliseconds(100))) return;
     shown_ = now;
-    fmt::print(stderr, "\r\033[K{} of {} runs, {} left; {}{}{}", done_, runs_, left(), what, phase.empty() ? "" : ": ",
+    cli::print(stderr, "\r\033[K{} of {} runs, {} left; {}{}{}", done_, runs_, left(), what, phase.empty() ? "" : ": ",
                phase);
     std::fflush(stderr);
   }
@@ -58,7 +58,7 @@ class Progress {
       ++done_;
       const std::size_t tenth = std::max<std::size_t>(1, runs_ / 10);
       if (!terminal_ && (done_ % tenth == 0 || done_ == runs_)) {
-        fmt::print(stderr, "{} of {} runs, {} left\n", done_, runs_, left());
+        cli::print(stderr, "{} of {} runs, {} left\n", done_, runs_, left());
       }
     }
     show(what, {});
@@ -69,7 +69,7 @@ class Progress {
   }
   [[nodiscard]] std::size_t done() const noexcept { return done_; }
   void end() const {
-    if (terminal_) fmt::print(stderr, "\r\033[K");
+    if (terminal_) cli::print(stderr, "\r\033[K");
   }
 
  private:
@@ -213,7 +213,7 @@ class SeriesRun {
     study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
     if (interrupted_ == 0 && signalled() != rig::Reason::none) interrupted_ = status_of(signalled());
-    fmt::print("{}\n", in_words());
+    cli::print("{}\n", in_words());
     if (interrupted_ != 0) return interrupted_;
     return ended_early_ == 0 && !cut_short() ? exit_completed : exit_ended_early;
   }

@@ -97,11 +97,11 @@ int run_study(const StudyCommand& command) {
     return status_of(signalled());
   }
   if (tally.runs == 0 && shard.of == 1) {
-    fmt::print("study {}: complete already; results: {}/{}\n", name_of(command.file), path, study::file::results);
+    cli::print("study {}: complete already; results: {}/{}\n", name_of(command.file), path, study::file::results);
     return exit_completed;
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  fmt::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
+  cli::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
              tally.runs, duration_text(spent_s), spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0,
              tally.faults, tally.refused);
   if (!tally.damaged.empty()) spdlog::warn("damaged chunks were computed anew: {}", study::list_of(tally.damaged));
@@ -109,9 +109,9 @@ int run_study(const StudyCommand& command) {
     spdlog::warn("{} runs could not begin; the column `reason` of the results says why", tally.refused);
   }
   if (shard.of == 1) {
-    fmt::print("results: {}/{}\n", path, study::file::results);
+    cli::print("results: {}/{}\n", path, study::file::results);
   } else {
-    fmt::print("part {} of {} is done, in {}; when all are: abs_hil study merge {}\n", shard.number, shard.of, path,
+    cli::print("part {} of {} is done, in {}; when all are: abs_hil study merge {}\n", shard.number, shard.of, path,
                path);
   }
   return exit_completed;
@@ -121,7 +121,7 @@ int merge_study(const std::vector<std::string>& folders) {
   const study::StudyFolder first(folders.front());
   const std::vector<study::StudyFolder> others(folders.begin() + 1, folders.end());
   first.merge(others);
-  fmt::print("results: {}/{}, {} runs\n", first.path().string(), study::file::results, first.facts().runs);
+  cli::print("results: {}/{}, {} runs\n", first.path().string(), study::file::results, first.facts().runs);
   return exit_completed;
 }
 
@@ -130,26 +130,26 @@ int show_status(const std::string& path) {
   const study::StudyFacts& facts = folder.facts();
   const std::uint64_t chunks = facts.chunks();
   if (folder.complete()) {
-    fmt::print("study {}: complete, {} runs in {}/{}\n", facts.name, facts.runs, path, study::file::results);
+    cli::print("study {}: complete, {} runs in {}/{}\n", facts.name, facts.runs, path, study::file::results);
   } else {
     const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
     std::uint64_t left = 0;
     for (const std::uint64_t chunk : missing) left += facts.runs_in(chunk);
     const std::uint64_t done = facts.runs - left;
-    fmt::print("study {}: {} of {} runs ({:.1f} %), {} of {} chunks, in {}\n", facts.name, done, facts.runs,
+    cli::print("study {}: {} of {} runs ({:.1f} %), {} of {} chunks, in {}\n", facts.name, done, facts.runs,
                100.0 * static_cast<double>(done) / static_cast<double>(facts.runs), chunks - missing.size(), chunks,
                path);
     if (missing.empty()) {
-      fmt::print("all chunks are there; put them together: abs_hil study merge {}\n", path);
+      cli::print("all chunks are there; put them together: abs_hil study merge {}\n", path);
     } else {
-      fmt::print("missing chunks: {}\n", study::list_of(missing));
+      cli::print("missing chunks: {}\n", study::list_of(missing));
       const std::vector<std::uint64_t> damaged = study::damaged_of(missing, folder);
       if (!damaged.empty()) {
-        fmt::print("of these damaged: {}; the study computes them anew when it goes on\n", study::list_of(damaged));
+        cli::print("of these damaged: {}; the study computes them anew when it goes on\n", study::list_of(damaged));
       }
     }
   }
-  fmt::print("{}", slurm_jobs(path));
+  cli::print("{}", slurm_jobs(path));
   return exit_completed;
 }
 
@@ -220,7 +220,7 @@ void RunProgress::show(std::uint64_t done) {
                                ? ""
                                : fmt::format(", {:.0f} runs/s, {} left", rate_Hz,
                                              duration_text(static_cast<double>(runs_ - done) / rate_Hz));
-  fmt::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
+  cli::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
   std::fflush(stderr);
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
@@ -15,7 +16,10 @@
 #include "files/result_file.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
+#include "rig/clean_text.hpp"
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
+#include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
 
 namespace abs_hil::program {
@@ -52,6 +56,17 @@ Printed output_of(const std::string& command) {
   return printed;
 }
 
+/// Tasks that the cluster takes in one array, whose indices from 1 stay below its MaxArraySize.
+std::uint64_t most_tasks() {
+  const Printed printed = output_of("scontrol show config 2>/dev/null");
+  constexpr std::string_view key = "MaxArraySize";
+  const std::size_t at =
+      printed.text.find_first_of("0123456789", std::min(printed.text.find(key), printed.text.size()));
+  const std::string_view from = std::string_view(printed.text).substr(std::min(at, printed.text.size()));
+  const auto size = rig::parse_number<std::uint64_t>(from.substr(0, from.find_first_not_of("0123456789")));
+  return size && *size > 1 ? *size - 1 : std::numeric_limits<std::uint64_t>::max();
+}
+
 void check_options(const std::vector<std::string>& options) {
   for (const std::string& option : options) {
     if (!option.starts_with('-') || option.find_first_of("\r\n") != std::string::npos) {
@@ -75,7 +90,7 @@ std::string script(const std::string& name, const std::string& log, const std::v
 }
 
 std::string submitted(const std::string& options, const fs::path& file) {
-  const Printed printed = output_of(fmt::format("sbatch --parsable {}{}", options, quoted(file.string())));
+  const Printed printed = output_of(fmt::format("sbatch --parsable {}{} 2>&1", options, quoted(file.string())));
   constexpr int not_found = 127;
   if (printed.status == not_found) {
     throw driver::Unavailable(
@@ -83,11 +98,20 @@ std::string submitted(const std::string& options, const fs::path& file) {
                     "{}",
                     file.parent_path().string()));
   }
-  // "ID" or "ID;CLUSTER"
-  const std::string id = printed.text.substr(0, printed.text.find_first_of(";\n"));
+  // A line "ID" or "ID;CLUSTER", among what sbatch has to remark.
+  std::string id;
+  for (const std::string_view line : rig::split(rig::trimmed(printed.text), '\n')) {
+    const std::string_view number = line.substr(0, line.find(';'));
+    if (rig::parse_number<std::uint64_t>(number)) {
+      id = number;
+    } else if (printed.status == 0 && !line.empty()) {
+      cli::print(stderr, "{}\n", line);
+    }
+  }
   if (printed.status != 0 || id.empty()) {
-    throw driver::Unavailable(
-        fmt::format("sbatch refused {} (its words are above); give its options after --", file.string()));
+    throw driver::Unavailable(fmt::format("sbatch refused {}: {}", file.string(),
+                                          rig::refusal(rig::clean_text(rig::trimmed(printed.text)), file,
+                                                       "give the options that this cluster wants after --")));
   }
   return id;
 }
@@ -110,16 +134,21 @@ int submit_study(const StudyCommand& command) {
   const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
   if (missing.empty()) {
     folder.merge({});
-    fmt::print("study {}: complete, nothing to submit; results: {}/{}\n", file.stem().string(), path.string(),
+    cli::print("study {}: complete, nothing to submit; results: {}/{}\n", file.stem().string(), path.string(),
                study::file::results);
     return exit_completed;
   }
-  const int tasks =
-      static_cast<int>(std::min<std::uint64_t>(missing.size(), static_cast<std::uint64_t>(command.array)));
+  const auto wanted = std::min<std::uint64_t>(missing.size(), static_cast<std::uint64_t>(command.array));
+  const auto tasks = std::min<std::uint64_t>(wanted, most_tasks());
+  if (tasks < wanted) {
+    cli::print(stderr,
+               "abs_hil: --array {}: the cluster takes arrays of at most {} tasks (MaxArraySize), so each does more\n",
+               command.array, tasks);
+  }
   const std::string program = quoted(fs::read_symlink("/proc/self/exe").string());
   const fs::path slurm = path / "slurm";
   fs::create_directories(slurm);
-  const std::string name = rig::plain_name(file.stem().string(), "-_");  // Slurm and a shell take it as it is
+  const std::string name = run_folder::folder_name(file.stem().string(), path);  // Slurm and a shell take it as it is
   const fs::path array = slurm / "array.sh";
   const fs::path merge = slurm / "merge.sh";
   files::write_result(array, "script",
@@ -132,14 +161,14 @@ int submit_study(const StudyCommand& command) {
                       script(name + "-merge", fmt::format("\"{}/%j-merge.log\"", slurm.string()), {"--requeue"},
                              command.sbatch, fmt::format("{} study merge {}", program, quoted(path.string()))));
   if (command.write_only) {
-    fmt::print("{}\n{}\n", array.string(), merge.string());
+    cli::print("{}\n{}\n", array.string(), merge.string());
     return exit_completed;
   }
   const std::string id = submitted("", array);
   // After any end: chunks that are missing then are named, and computed by the next `submit`.
   const std::string merge_id = submitted(fmt::format("--dependency=afterany:{} ", id), merge);
   std::ofstream(slurm / jobs_file, std::ios::app) << id << '\n' << merge_id << '\n';
-  fmt::print("study {}: {} chunks in {} tasks of job {}, then merge in job {}; see abs_hil study status {}\n",
+  cli::print("study {}: {} chunks in {} tasks of job {}, then merge in job {}; see abs_hil study status {}\n",
              file.stem().string(), missing.size(), tasks, id, merge_id, path.string());
   return exit_completed;
 }

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "rig/error_words.hpp"
+
 namespace abs_hil::program {
 
 namespace {
@@ -72,11 +74,10 @@ std::optional<int> start_python_program(int argc, char** argv) {
   ::execv(beside.c_str(), arguments.data());
   if (errno == ENOENT) ::execvp(file.c_str(), arguments.data());
   const int why = errno;
-  fmt::print(
-      stderr,
-      "abs_hil: {}: {}: `abs_hil {}` is a program in Python; install the package python3-abs-hil, or `pip install "
-      ".` in the source folder\n",
-      beside, std::strerror(why), name);
+  const std::string cause = why == ENOENT ? "No such file or directory; install the package python3-abs-hil, or `pip "
+                                            "install .` in the source folder"
+                                          : rig::refusal(why, beside, rig::starting);
+  cli::print(stderr, "abs_hil: {}: {} (`abs_hil {}` is a program in Python)\n", beside, cause, name);
   return exit_unavailable;
 }
 

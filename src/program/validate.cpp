@@ -24,11 +24,11 @@ int validate(const config::Sources& sources) {
   const config::Configuration merged = config::merge(sources);
   const config::Script& script = *merged.script;
   const config::Settings& s = merged.settings;
-  fmt::print("{}", config::explain(script, s));
+  cli::print("{}", config::explain(script, s));
   if (!script.series.experiments.empty()) {
     int status = exit_completed;
     for (const std::string& name : script.series.experiments) {
-      fmt::print("\n");
+      cli::print("\n");
       config::Sources one = sources;
       one.experiment = name;
       config::refuse_nested(script, *config::find(*one.experiment));
@@ -40,14 +40,14 @@ int validate(const config::Sources& sources) {
   std::vector<std::string> problems = config::beyond_limits(plan, s);
   for (std::string& problem : problems) problem += "; give at most that in this phase, or raise the limit";
   std::ranges::move(config::certain_faults(plan, s), std::back_inserter(problems));
-  for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
+  for (const std::string& problem : problems) cli::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
   // Find errors that appear only when a run is made.
   static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
   if (s.backend == "sim") static_cast<void>(plant_sim::Plant(s.plant));
   const std::string model = config::in_words(config::model_differences(s));
-  if (!s.on_rig() && !model.empty()) fmt::print("The model differs from the plant: {}.\n", model);
-  fmt::print(
+  if (!s.on_rig() && !model.empty()) cli::print("The model differs from the plant: {}.\n", model);
+  cli::print(
       "The experiment is within the limits of backend {}, {} {}.{}\n", s.backend, s.on_rig() ? "model" : "plant",
       s.plant_name,
       script.events.empty() ? "" : " It has events, which only a simulation can carry out: --backend rig refuses it.");
@@ -69,7 +69,7 @@ int init_rig(const config::Settings& settings, const std::string& name) {
   } catch (const files::FileError& error) {
     throw config::ConfigError(std::string("init-rig: ") + error.what());
   }
-  fmt::print(
+  cli::print(
       "{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil commission --set rig.identity={0}, "
       "abs_hil --backend rig --set rig.identity={0} --model {0}\n",
       file.string());
@@ -87,7 +87,7 @@ Action add_validate(cli::Parser& parser, const Words&) {
   add_configuration_options(parser, *o);
   return [o, schema] {
     if (!*schema) return validate(*o);
-    fmt::print("{}\n", config::schema().dump(2));
+    cli::print("{}\n", config::schema().dump(2));
     return int{exit_completed};
   };
 }

@@ -13,6 +13,7 @@
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "files/result_file.hpp"
+#include "rig/error_words.hpp"
 #include "rig/parse_json.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
@@ -124,8 +125,8 @@ StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path
   std::error_code error;
   fs::create_directories(path_, error);
   if (error) {
-    throw config::ConfigError(fmt::format("{}: cannot create this folder: {}; give a folder that can be written",
-                                          path_.string(), error.message()));
+    throw config::ConfigError(fmt::format("{}: cannot create this folder: {}", path_.string(),
+                                          rig::refusal(error.value(), path_, rig::writing)));
   }
   if (fs::is_regular_file(path_ / file::index, error)) {
     const StudyFacts there = read_facts(path_);

@@ -11,6 +11,7 @@
 
 #include "config/config_error.hpp"
 #include "config/reader.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::study {
 
@@ -106,9 +107,9 @@ StudyScript parse_study(std::string text, std::string path) {
 StudyScript load_study(const std::string& path) {
   std::error_code error;
   std::ifstream file(path, std::ios::binary);
-  if (!std::filesystem::is_regular_file(path, error) || !file) {
-    throw config::ConfigError(
-        fmt::format("{}: no such file, or it cannot be read; give a study, a TOML file (docs/studies.md)", path));
+  if (const int why = errno; !std::filesystem::is_regular_file(path, error) || !file) {
+    throw config::ConfigError(fmt::format("{}: {}; give a study, a TOML file (docs/studies.md)", path,
+                                          file ? "not a regular file" : rig::refusal(why, path, rig::reading)));
   }
   return parse_study({std::istreambuf_iterator<char>(file), {}}, path);
 }

@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "rig/error_words.hpp"
+
 namespace abs_hil::telemetry {
 
 LcmUrl parse_lcm_url(std::string_view url) {
@@ -113,7 +115,7 @@ RouteProbe probe_udpm(const Endpoint& endpoint) {
   if (error == ENETUNREACH || error == EHOSTUNREACH || error == ENETDOWN) {
     return {false, "no route for multicast to " + where, route_fix};
   }
-  return {false, "cannot use UDP multicast to " + where + ": " + std::generic_category().message(error), route_fix};
+  return {false, "cannot use UDP multicast to " + where, rig::refusal(error, where, rig::reaching)};
 }
 
 RouteProbe probe_tcpq(const Endpoint& endpoint) {

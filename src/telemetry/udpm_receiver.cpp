@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "rig/error_words.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/lcm_url.hpp"
 
@@ -98,7 +99,7 @@ UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channe
   if (group && join(socket_.get(), *group, number_in(parts.options, "recv_buf_size="))) return;
   const int problem = !group ? EINVAL : socket_.get() < 0 ? why_no_socket : errno;
   throw LcmError("commands cannot be received at " + endpoint.address + ":" + std::to_string(endpoint.port) + ": " +
-                 std::generic_category().message(problem));
+                 rig::refusal(problem, endpoint.address, rig::reaching));
 }
 
 bool UdpmReceiver::is_from_here(const in_addr& sender) noexcept {

@@ -24,6 +24,7 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/monotonic_time.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -147,8 +148,8 @@ BusReport bus_report(const Frame& error_frame) noexcept {
 
 namespace {
 
-[[noreturn]] void refuse_with_cause(const std::string& what, const std::string& fix = {}) {
-  refuse(what + ": " + std::strerror(errno) + fix);
+[[noreturn]] void refuse_with_cause(const std::string& what) {
+  refuse(what + ": " + rig::refusal(errno, "can_raw", rig::reaching));
 }
 
 void set_option(const FileDescriptor& socket, int name, const void* value, std::size_t size, const char* what) {
@@ -170,7 +171,7 @@ std::vector<can_filter> node_filters() {
 FileDescriptor open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
   FileDescriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (socket.get() < 0) {
-    refuse_with_cause("cannot open a CAN socket", "; load the kernel module: sudo modprobe can_raw");
+    refuse_with_cause("cannot open a CAN socket");
   }
   const std::vector<can_filter> filters = node_filters();
   set_option(socket, CAN_RAW_FILTER, filters.data(), filters.size() * sizeof(can_filter), "filters");
@@ -234,7 +235,7 @@ Link open_unix_socket(const std::string& path, bool wait) {
   const timeval limit{.tv_sec = wait ? 2 : 0, .tv_usec = wait ? 0 : 1};
   ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    refuse_with_cause("socket " + path + " (driver.can.interface)", "; start abs_rig_emulator --can unix:" + path);
+    refuse_with_cause("socket " + path + " (driver.can.interface; start abs_rig_emulator --can unix:" + path + ")");
   }
   return {.socket = std::make_unique<FrameSocket>(std::move(socket)), .place = "socket " + path, .can_fd = true};
 }

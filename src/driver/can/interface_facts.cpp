@@ -14,6 +14,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/can/bus.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -94,7 +95,7 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
 }
 
 [[noreturn]] void refuse_interfaces(const char* what) {
-  throw Unavailable(std::string("CAN interfaces: ") + what + ": " + std::strerror(errno));
+  throw Unavailable(std::string("CAN interfaces: ") + what + ": " + rig::refusal(errno, what, rig::reaching));
 }
 
 void ask_for_links(int descriptor) {

@@ -14,6 +14,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -60,7 +61,8 @@ void Packet::write_number(std::uint16_t address, std::uint32_t number) noexcept 
 }
 
 NoSocket::NoSocket(int error)
-    : Unavailable(std::string("backend rig: no UDP socket to the hm2 board: ") + std::strerror(error)),
+    : Unavailable("backend rig: no UDP socket to the hm2 board: " +
+                  rig::refusal(error, "driver.hm2.address", rig::reaching)),
       errno_value(error) {}
 
 UdpLink::UdpLink(const sockaddr_in& board) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {

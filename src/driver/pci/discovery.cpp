@@ -7,6 +7,7 @@
 
 #include "driver/pci/wire.hpp"
 #include "driver/sysfs.hpp"
+#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
@@ -195,8 +196,8 @@ std::vector<std::string> find_cards(const fs::path& root) {
   std::vector<std::string> cards;
   fs::directory_iterator entries(root, error);
   if (error) {
-    refuse("cannot look for PCI devices in " + root.string() + " (driver.pci.root): " + error.message() +
-           ". To run without the rig, use --backend sim");
+    refuse("cannot look for PCI devices in " + root.string() + " (driver.pci.root): " +
+           rig::refusal(error.value(), root, rig::reading) + ". To run without the rig, use --backend sim");
   }
   for (const fs::directory_iterator end; entries != end && !error; entries.increment(error)) {
     if (is_the_card(entries->path())) cards.push_back(entries->path().filename().string());

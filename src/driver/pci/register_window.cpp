@@ -14,6 +14,7 @@
 
 #include "driver/pci/wire.hpp"
 #include "driver/sysfs.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -33,7 +34,7 @@ int open_for_access(const std::filesystem::path& file) {
     refuse_file(file, std::string("permission denied (") + std::strerror(error) +
                           "): install config/udev/70-abs-hil.rules and join the group abs_hil (docs/rig-setup.md)");
   }
-  refuse_file(file, std::string("cannot be opened: ") + std::strerror(error));
+  refuse_file(file, "cannot be opened: " + rig::refusal(error, file, rig::reaching));
 }
 
 /// The process that holds the flock of an open file, from /proc/locks ("7: FLOCK ADVISORY WRITE 4711 00:3a:42 0 EOF").

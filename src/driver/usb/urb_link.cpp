@@ -16,6 +16,7 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/usb/wire.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -63,7 +64,8 @@ constexpr std::int64_t give_up_ns = rig::ns_per_s;
 
 /// Refuses the device if `result` is -errno.
 void require(const UsbDevice& device, std::int64_t result, const std::string& what) {
-  if (result < 0) refuse_device(device, what + ": " + std::strerror(static_cast<int>(-result)));
+  if (result < 0)
+    refuse_device(device, what + ": " + rig::refusal(static_cast<int>(-result), device.node, rig::reaching));
 }
 
 /// @param result 0 or more, or -errno of a system call
@@ -95,9 +97,12 @@ class Node {
  public:
   Node(const UsbDevice& device, Usbfs& usbfs) : usbfs_(usbfs), file_(usbfs.open(device.node.c_str())) {
     if (file_ >= 0) return;
-    std::string what = device.node.string() + ": " + std::strerror(-file_);
-    if (file_ == -EACCES || file_ == -EPERM) {
-      what += ". Put this line into /etc/udev/rules.d/70-abs-hil.rules and plug the board in again (docs/usb.md):\n" +
+    std::string what = device.node.string() + ": ";
+    if (file_ != -EACCES && file_ != -EPERM) {
+      what += rig::refusal(-file_, device.node, rig::reaching);
+    } else {
+      what += std::string(std::strerror(-file_)) +
+              ". Put this line into /etc/udev/rules.d/70-abs-hil.rules and plug the board in again (docs/usb.md):\n" +
               udev_rule(device);
     }
     refuse_device(device, what);
