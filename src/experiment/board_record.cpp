@@ -165,17 +165,16 @@ std::string difference(const BoardRecord& record, const BoardRecord& present) {
   return {};
 }
 
-std::vector<fs::path> record_folders(const std::string& configured) {
-  if (!configured.empty()) return {configured};
-  std::vector<fs::path> folders{"/var/lib/abs_hil/boards"};
+fs::path state_folder() {
   const char* state = std::getenv("XDG_STATE_HOME");
   const char* home = std::getenv("HOME");
-  if (state != nullptr && *state == '/') {
-    folders.push_back(fs::path(state) / "abs_hil/boards");
-  } else if (home != nullptr && *home == '/') {
-    folders.push_back(fs::path(home) / ".local/state/abs_hil/boards");
-  }
-  return folders;
+  if (state != nullptr && *state == '/') return fs::path(state) / "abs_hil";
+  return home != nullptr && *home == '/' ? fs::path(home) / ".local/state/abs_hil" : fs::path("/var/lib/abs_hil");
+}
+
+std::vector<fs::path> record_folders(const std::string& configured) {
+  if (!configured.empty()) return {configured};
+  return {"/var/lib/abs_hil/boards", state_folder() / "boards"};
 }
 
 fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& folders) {

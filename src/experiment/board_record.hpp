@@ -48,6 +48,10 @@ struct BoardRecord {
 /// duty caps.
 [[nodiscard]] std::string difference(const BoardRecord& record, const BoardRecord& present);
 
+/// The user's folder for what outlives a run: $XDG_STATE_HOME/abs_hil, ~/.local/state/abs_hil, or without a home
+/// /var/lib/abs_hil.
+[[nodiscard]] std::filesystem::path state_folder();
+
 /// The folders in which records are looked for, in this order: the configured one alone, otherwise
 /// /var/lib/abs_hil/boards and the user's own ($XDG_STATE_HOME/abs_hil/boards).
 [[nodiscard]] std::vector<std::filesystem::path> record_folders(const std::string& configured);

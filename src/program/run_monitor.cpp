@@ -10,6 +10,8 @@
 #include <ctime>
 
 #include "config/config_error.hpp"
+#include "experiment/board_record.hpp"
+#include "rig/error_words.hpp"
 #include "telemetry/flight_record.hpp"
 
 namespace abs_hil::program {
@@ -127,27 +129,27 @@ void RunMonitor::end() {
 }
 
 std::filesystem::path flight_record_prefix(const RunRequest& request, const std::filesystem::path& run_folder) {
+  namespace fs = std::filesystem;
   const OutputOptions& o = request.outputs;
   if (!o.recorder_dir && !run_folder.empty()) return run_folder / "recorder";
-  std::filesystem::path folder;
-  if (o.recorder_dir) {
-    folder = *o.recorder_dir;
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error || ::access(folder.c_str(), W_OK | X_OK) != 0) {
-      throw config::ConfigError(fmt::format("--recorder {}: {}; give a folder that can be created or written to",
-                                            folder.string(), error ? error.message() : std::strerror(errno)));
-    }
-  } else if (o.log_file || o.csv_file || o.summary_file) {
-    folder = std::filesystem::path(o.log_file ? *o.log_file : o.csv_file ? *o.csv_file : *o.summary_file).parent_path();
-    if (folder.empty()) folder = ".";
-  } else if (request.settings.backend == "rig") {
-    folder = ".";
-  } else {
-    return {};
+  fs::path folder = o.recorder_dir.value_or("");
+  std::error_code error;
+  for (const auto* file : {&o.log_file, &o.csv_file, &o.summary_file}) {
+    if (folder.empty() && file->has_value() && !fs::is_other(**file, error)) folder = fs::path(**file).parent_path();
+  }
+  if (folder.empty()) {
+    if (!o.log_file && !o.csv_file && !o.summary_file && request.settings.backend != "rig") return {};
+    folder = experiment::state_folder() / "recorder";
+  }
+  fs::create_directories(folder, error);
+  if (error || ::access(folder.c_str(), W_OK | X_OK) != 0) {
+    const int why = error ? error.value() : errno;
+    if (o.recorder_dir)
+      throw config::ConfigError("--recorder " + *o.recorder_dir + ": " + rig::refusal(why, folder, rig::writing));
+    folder = fs::temp_directory_path(error);
   }
   const std::string name = fmt::format("recorder-{:%Y%m%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), ::getpid());
-  return std::filesystem::absolute(folder) / name;
+  return fs::absolute(folder) / name;
 }
 
 }  // namespace abs_hil::program

@@ -56,8 +56,9 @@ class RunMonitor {
   bool told_notes_{false};
 };
 
-/// The place of a run's flight record: the folder of --recorder, else the run folder, else the folder of a named file,
-/// else (for a board) the working directory. Creates the folder of --recorder. Throws config::ConfigError.
+/// The place of a run's flight record: the folder of --recorder, else the run folder, else that which a named file's
+/// path has, else (for a board, or with a named file) the state folder, or the one for temporary files where that
+/// cannot be written. Creates it. Throws config::ConfigError for --recorder.
 /// @param run_folder  empty: none
 [[nodiscard]] std::filesystem::path flight_record_prefix(const RunRequest& request,
                                                          const std::filesystem::path& run_folder);

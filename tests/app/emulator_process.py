@@ -82,7 +82,7 @@ class EmulatorTest(ProgramTest):
         return self._emulators[-1]
 
     def run_program(self, *args, **kwargs):
-        """Starts abs_hil in this test's folder, which gets the flight record of a fault."""
+        """Starts abs_hil in this test's folder."""
         return super().run_program(*args, **{'cwd': self.folder, **kwargs})
 
     def start_program(self, *args):

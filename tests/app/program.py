@@ -18,6 +18,7 @@ class ProgramTest(unittest.TestCase):
     def setUp(self):
         self._folder = tempfile.TemporaryDirectory()
         self.folder = pathlib.Path(self._folder.name)
+        os.environ['XDG_STATE_HOME'] = str(self.folder / 'state')  # the flight record of a fault
 
     def tearDown(self):
         self._folder.cleanup()
