@@ -130,9 +130,11 @@ enum class ReplayFinds : std::uint8_t {
   ROW(encoder_lower_jumped, 133, fault, jumped_counts,                                                                \
       "lower wheel's encoder shows speeds that the wheel cannot reach",                                               \
       "angle or speed by its counts", "rad or rad/s", "what motor, tyre and the speed before permit")                 \
-  ROW(encoder_upper_reversed, 134, fault, wheel_checks, "upper wheel's encoder counts backwards",                     \
+  ROW(encoder_upper_reversed, 134, fault, wheel_checks,                                                               \
+      "upper wheel's encoder counts backwards: exchange its lines A and B, or negate the board's upper_sign",             \
       "speed by its counts", "rad/s", "0")                                                                            \
-  ROW(encoder_lower_reversed, 135, fault, wheel_checks, "lower wheel's encoder counts backwards",                     \
+  ROW(encoder_lower_reversed, 135, fault, wheel_checks,                                                               \
+      "lower wheel's encoder counts backwards: exchange its lines A and B, or negate the board's lower_sign",             \
       "speed by its counts", "rad/s", "0")                                                                            \
   ROW(encoders_lost, 136, fault, wheel_checks, "both encoders show standstill, but the wheels must be turning")       \
   ROW(encoders_disagree, 137, fault, wheel_checks,                                                                    \
