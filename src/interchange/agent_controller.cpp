@@ -13,6 +13,7 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "driver/file_descriptor.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::interchange {
 
@@ -27,7 +28,7 @@ constexpr double longest_hold_s = 1.0;
 
 AgentPage* mapped(const std::string& file) {
   const driver::FileDescriptor opened(::open(file.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-  if (opened.get() < 0) refuse_agent(file, std::strerror(errno));
+  if (opened.get() < 0) refuse_agent(file, rig::refusal(errno, file, rig::reading));
   struct stat facts {};
   if (::fstat(opened.get(), &facts) != 0 || !S_ISREG(facts.st_mode) ||
       facts.st_size != static_cast<off_t>(AgentPage::size)) {
@@ -35,7 +36,7 @@ AgentPage* mapped(const std::string& file) {
   }
   void* const memory =
       ::mmap(nullptr, AgentPage::size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, opened.get(), 0);
-  if (memory == MAP_FAILED) refuse_agent(file, std::strerror(errno));
+  if (memory == MAP_FAILED) refuse_agent(file, rig::refusal(errno, file, rig::reading));
   auto* const page = static_cast<AgentPage*>(memory);
   if (page->mark == AgentPage::right_mark && page->hold_s > 0.0 && page->hold_s <= longest_hold_s) return page;
   ::munmap(memory, AgentPage::size);
