@@ -46,6 +46,7 @@ struct EmulatorOptions {
   std::string hm2_address{};                                   ///< ADDRESS or ADDRESS:PORT, of a 7I92T
   std::string node_address{};                                  ///< the same of the node of docs/node.md
   std::string mac{};                                           ///< "00:60:1b:16:ab:50"; empty: the default
+  std::vector<std::string> wrong_words{};                      ///< "0x458=0x01010204", of the 7I92T's description
   // What the card's folder shows.
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string vendor{"0x10b5"};

@@ -23,6 +23,7 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "control.hpp"
+#include "version/build_facts.hpp"
 
 namespace {
 
@@ -79,7 +80,9 @@ void add_hm2_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
   plain(parser, "--board-name", &emulator.hm2.name,
         "name that the 7I92T or the node reports, for example 7I92 [7I92T, abs-node]");
   plain(parser, "--mac", &emulator.mac, "MAC address in the EEPROM of the 7I92T or the node: 00:60:1b:16:ab:50");
-  parser.add("--wrong-board", &emulator.hm2.lie, "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies());
+  parser.add("--wrong-board", &emulator.wrong_words,
+             "a word of the 7I92T's description that is another one: 0x458=0x01010204 leaves it one counter",
+             {.type = "ADDRESS=VALUE", .repeated = true});
   plain(parser, "--active-high", &emulator.hm2.active_high_stage,
         "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM");
 }
@@ -199,6 +202,7 @@ int run(int argc, char** argv) {
   // Without a name of its own: its help begins with the path that the user typed.
   cli::Parser parser("",
                      "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node, RT-DAC/USB2 or Mesa 7I92T");
+  parser.set_version(version::version_line("abs_rig_emulator"));
   Arguments arguments;
   add_options(parser, arguments);
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;

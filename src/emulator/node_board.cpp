@@ -82,8 +82,7 @@ class NodeBoard final : public UdpBoard {
   [[nodiscard]] Outputs outputs() const noexcept override {
     const auto duty = [this](std::uint32_t channel) { return node_duty(&core_, channel) / 4096.0; };
     const bool enabled = options_.enable_pin < 0 || node_output(&core_);
-    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(options_.drive_pwm),
-            .brake_duty = duty(options_.brake_pwm)};
+    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(0), .brake_duty = duty(1)};
   }
   [[nodiscard]] bool bitten() const noexcept override { return core_.latched; }
   [[nodiscard]] bool drives_pins() const noexcept override { return node_drives(&core_, 0) || node_drives(&core_, 1); }
@@ -140,8 +139,7 @@ class NodeBoard final : public UdpBoard {
   /// What the chip's loop does: counters, then the watchdog.
   void look() {
     for (const bool upper : {false, true}) {
-      node_count(&core_, upper ? options_.upper_encoder : options_.lower_encoder,
-                 static_cast<std::uint16_t>(position(upper)), now_us());
+      node_count(&core_, upper ? 1 : 0, static_cast<std::uint16_t>(position(upper)), now_us());
     }
     const bool was_latched = core_.latched;
     node_poll(&core_, now_us());

@@ -26,7 +26,12 @@ constexpr double answer_share = 0.8;  // of the period
 constexpr std::uint32_t unbuffered_12_bit = 0x03;
 constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
 constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
-constexpr std::uint32_t filter_at_25_MHz = 2;
+/// Of a counter's lines: the clock / (n + 2) is 25 MHz at 100 MHz. What multiplexes them takes longer: 8 MHz.
+std::uint32_t filter_of(const Board& board) {
+  constexpr double muxed_Hz = 8e6;
+  constexpr double usual = 2.0;
+  return static_cast<std::uint32_t>(board.multiplexed ? std::max(0.0, board.counter.clock_Hz / muxed_Hz - 2.0) : usual);
+}
 /// Register 1 of the ports at base 0x1000, in all firmware known to us.
 constexpr std::uint16_t usual_direction = 0x1100;
 
@@ -190,7 +195,7 @@ Packet Hm2Driver::set_up_packet() const noexcept {
   packet.write32(wire_.port_data, of_ports(none, board_));
   write_pair(packet, wire_.control, {count_filter, count_filter});
   packet.write32(board_.counter.address(reg::stamp_divisor), stamps_at_2_MHz);
-  packet.write32(board_.counter.address(reg::filter), filter_at_25_MHz);
+  packet.write32(board_.counter.address(reg::filter), filter_of(board_));
   packet.write32(board_.watchdog.address(reg::time), watchdog_time(options_, board_));
   packet.write32(wire_.bitten, 0);
   packet.write_number(at::write_number, write_number_);

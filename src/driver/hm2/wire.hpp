@@ -224,8 +224,14 @@ inline constexpr std::uint8_t watchdog = 2;
 inline constexpr std::uint8_t port = 3;
 inline constexpr std::uint8_t counter = 4;
 inline constexpr std::uint8_t pwm = 6;
+inline constexpr std::uint8_t muxed_counter = 12;
+inline constexpr std::uint8_t muxed_select = 13;
 }  // namespace tag
+// Functions of their pins.
+inline constexpr std::uint8_t signal_a = 1;
+inline constexpr std::uint8_t signal_b = 2;
 inline constexpr std::uint8_t pwm_output = 0x81;
+inline constexpr std::uint8_t muxed_select_output = 0x81;
 
 /// A board as it describes itself.
 struct Board {
@@ -242,6 +248,9 @@ struct Board {
   Module port{};
   Module counter{};
   Module pwm{};
+  /// `counter` is the multiplexed kind: of two counters with the same pins the odd one counts while the select pin is
+  /// high, as it also is when nobody drives it; the even one counts only while the board drives this pin.
+  bool multiplexed{false};
   std::vector<Pin> pins{};
   std::vector<std::string> modules{};  ///< each in words
 };
