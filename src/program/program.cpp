@@ -47,7 +47,6 @@ int dispatch(int argc, char** argv) {
   const program::Words words(argv, argv + argc);
   cli::Parser parser("abs_hil", "Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig");
   parser.set_version(version::version_line("abs_hil"));
-  parser.set_footer("`abs_hil help SUBCOMMAND` shows a subcommand's options.");
   for (const char* word : {"run", "simulate", "sim"}) {
     parser.explain(word, fmt::format("{} is no subcommand: `abs_hil` alone is a run. `abs_hil --fast` simulates one at "
                                      "once, `abs_hil --backend sim` in real time; `--backend rig` drives a board",
@@ -69,6 +68,7 @@ int dispatch(int argc, char** argv) {
     const bool named = std::ranges::find(words, row.name) != words.end();
     if (row.add != nullptr && named) command.act = row.add(command.parser, words);
   }
+  parser.set_footer("`abs_hil help SUBCOMMAND` shows a subcommand's options.");
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
   for (const Command& command : commands) {
     if (!command.parser.parsed()) continue;

@@ -331,13 +331,13 @@ TEST_CASE("help is broken between words at the terminal's width, below the text 
         "  -h,--help                   Print this help\n"
         "      message and exit\n"
         "  --file TEXT                 what the controller\n"
-        "      learns for the next braking on this rig, and\n"
+        "      learns for the next braking on this rig,\n"
         "      no more than that\n"
         "  --fault TEXT                given as\n"
         "      PHASE@SIGNAL:KIND[=PARAMETER][+DELAY] and so\n"
         "      on\n"
         "\n");
-  CHECK(help_at("62").find("\n                              the next braking on this rig, and\n") != std::string::npos);
+  CHECK(help_at("62").find("\n                              the next braking on this rig,\n") != std::string::npos);
   const auto words_of = [](const std::string& text) {
     std::istringstream in(text);
     return std::vector<std::string>{std::istream_iterator<std::string>(in), {}};

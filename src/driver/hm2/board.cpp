@@ -291,7 +291,8 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
       refuse(given + "this firmware brings the signals A and B of that counter to no I/O pins");
     }
   }
-  if (board.multiplexed && pin_of(tag::muxed_select, muxed_select_output, 0) < 0) {
+  const auto selects = [&](const Pin& pin) { return board.multiplexed && pin.tag == tag::muxed_select; };
+  if (board.multiplexed && std::ranges::none_of(board.pins, selects)) {
     refuse("the hm2 board's counters are multiplexed, and no I/O pin selects one of them");
   }
   UsedPins used;
@@ -315,10 +316,9 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
     const Pin& pin = board.pins[i];
     const bool counts = pin.tag == counter &&
                         (pin.unit == unit_of(options.lower_channel) || pin.unit == unit_of(options.upper_channel));
-    const bool selects = board.multiplexed && pin.tag == tag::muxed_select;
-    if (counts || selects) word(used.modules, i) |= bit(i);
+    if (counts || selects(pin)) word(used.modules, i) |= bit(i);
     if (counts) word(counted, i) |= bit(i);
-    if (selects) word(used.outputs, i) |= bit(i);
+    if (selects(pin)) word(used.outputs, i) |= bit(i);
   }
   for (const auto& [key, pwm, wanted] : {tuple("drive_pin", options.drive_pwm, options.drive_pin),
                                          {"brake_pin", options.brake_pwm, options.brake_pin}}) {

@@ -231,7 +231,6 @@ inline constexpr std::uint8_t muxed_select = 13;
 inline constexpr std::uint8_t signal_a = 1;
 inline constexpr std::uint8_t signal_b = 2;
 inline constexpr std::uint8_t pwm_output = 0x81;
-inline constexpr std::uint8_t muxed_select_output = 0x81;
 
 /// A board as it describes itself.
 struct Board {

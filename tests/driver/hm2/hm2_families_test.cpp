@@ -14,7 +14,7 @@ namespace {
 
 // Module descriptors: tag, version, clock (1 low, 2 high), instances.
 constexpr unsigned watchdog = 2, port = 3, counter = 4, stepgen = 5, pwm = 6, ssi = 8, muxed = 12, muxed_select = 13,
-                   three_phase_pwm = 20, biss = 22, dpll = 26, leds = 128, resolver = 192, smart_serial = 193;
+                   biss = 22, dpll = 26, leds = 128, resolver = 192, smart_serial = 193;
 struct ModuleRow {
   unsigned tag;
   unsigned version;
@@ -96,16 +96,16 @@ Family on_7i97(unsigned version = 4, unsigned counters = 8, unsigned pwms = 7) {
                  {stepgen, 2, 4},
                  {pwm, 0, pwms},
                  {leds, 0, 1}},
-                {{18, 0, muxed_select, 0x81}}};
+                {{18, 4, muxed_select, 0x81}}};  // its unit says nothing
   for (unsigned unit = 0; unit < 5; ++unit) family.pins.push_back({unit, unit, pwm, 0x81});
   for (unsigned pair = 0; pair < 3; ++pair) add_counter(family.pins, 9 + 3 * pair, pair, muxed);
   return family;
 }
 
-/// PIN_SVST16_24_144: each pair of servo axes has twelve pins.
-Family on_svst16() {
+/// PIN_SVST16_24_144: each pair of servo axes has twelve pins. PIN_SVST8_3P_72 has the same, with version 3.
+Family on_svst16(unsigned version = 2) {
   Family family{
-      "SVST16_24", 6, 24, {{watchdog, 0, 1}, {port, 0, 6}, {counter, 2, 16}, {pwm, 0, 16}, {stepgen, 2, 24}}, {}};
+      "SVST16_24", 6, 24, {{watchdog, 0, 1}, {port, 0, 6}, {counter, version, 16}, {pwm, 0, 16}, {stepgen, 2, 24}}, {}};
   for (unsigned pair = 0; pair < 8; ++pair) {
     const unsigned io = 12 * pair;
     for (const unsigned odd : {0U, 1U}) {  // the odd axis comes first
@@ -130,6 +130,7 @@ const Hm2Options odd_counters{.drive_pin = -1, .brake_pin = -1, .lower_channel =
 
 TEST_CASE("Servo firmware with plain counters is taken, with the PWM's pins as that firmware has them") {
   CHECK(verdict(on_svst16(), any_pins) == "taken");
+  CHECK(verdict(on_svst16(3), any_pins) == "taken");
   CHECK(verdict(on_svst16(), {.drive_pin = 7, .brake_pin = 6}) == "taken");
   CHECK_THAT(verdict(on_svst16(), {}), Contains("driver.hm2.drive_pin = 1, but the board has that PWM at I/O pin 7"));
   // The last axes: register 15 of each module.
@@ -200,16 +201,17 @@ TEST_CASE("Firmware without two counters or two PWMs is refused with what it lac
   for (const Row& row : {
            Row{without_pins("G540_7I85S", {{muxed, 4, 4}, {muxed_select, 0, 1}, {stepgen, 2, 9}, {pwm, 0, 1}}),
                "it has 1 PWM, the rig needs 2"},
-           Row{without_pins("7I77x2", {{muxed, 4, 12}, {muxed_select, 0, 1}, {smart_serial, 0, 1}}),
+           Row{without_pins("7I77x2_ssi", {{muxed, 4, 12}, {muxed_select, 0, 1}, {smart_serial, 0, 1}, {ssi, 0, 2}}),
                "it has 0 PWMs, the rig needs 2"},
            Row{without_pins("7I76x2", {{counter, 2, 2}, {smart_serial, 0, 1}, {stepgen, 2, 10}}), "it has 0 PWMs"},
+           Row{without_pins("7I85Sx2", {{muxed, 4, 8}, {muxed_select, 0, 1}, {smart_serial, 0, 1}, {stepgen, 2, 8}}),
+               "it has 0 PWMs"},
+           Row{without_pins("SVBI8_8", {{counter, 2, 8}, {biss, 0, 8}}), "it has 0 PWMs"},
            Row{without_pins("G540 on one port", {{counter, 2, 1}, {pwm, 0, 1}, {stepgen, 2, 5}}),
                "it has 1 quadrature counter, the rig needs 2"},
            Row{without_pins("ST12", {{stepgen, 2, 12}}), "it has 0 quadrature counters, the rig needs 2"},
-           Row{without_pins("RMSVSS6_8", {{resolver, 0, 1}, {pwm, 0, 6}}), "it has 0 quadrature counters"},
-           Row{without_pins("7I77x2_ssi", {{ssi, 0, 4}, {pwm, 0, 2}}), "it has 0 quadrature counters"},
-           Row{without_pins("SVBI8_8", {{biss, 0, 8}, {pwm, 0, 8}}), "it has 0 quadrature counters"},
-           Row{without_pins("three-phase", {{counter, 2, 8}, {three_phase_pwm, 0, 8}}), "it has 0 PWMs"},
+           Row{without_pins("RMSVSS6_8", {{resolver, 0, 1}, {pwm, 0, 6}, {smart_serial, 0, 1}}),
+               "it has 0 quadrature counters"},
            Row{without_pins("IOONLY", {}), "it has 0 quadrature counters"},
        }) {
     CAPTURE(row.family.name);
