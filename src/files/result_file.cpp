@@ -79,7 +79,11 @@ std::shared_ptr<void> claim(const std::string& kind, const fs::path& path, const
           }};
 }
 
+std::atomic<bool> stdout_taken{false};
+
 }  // namespace
+
+std::FILE* for_people() noexcept { return stdout_taken ? stderr : stdout; }
 
 void note_input(const fs::path& path) {
   std::error_code error;
@@ -91,7 +95,12 @@ void note_input(const fs::path& path) {
 ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_folder)
     : path_(std::move(path)), kind_(std::move(kind)) {
   buffer_.reserve(buffer_bytes);
-  open_target(path_, 0);
+  const bool to_stdout = path_ == "-";
+  open_target(to_stdout ? "/dev/stdout" : path_, 0);
+  if (to_stdout) {
+    claim_ = claim(kind_, path_, path_);
+    stdout_taken = true;
+  }
   if (!target_.empty()) claim_ = claim(kind_, path_, target_);
   if (file_ < 0) open_part(part_folder);
 }

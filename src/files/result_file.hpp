@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -27,10 +28,10 @@ class FileError : public std::runtime_error {
 /// Several processes on several computers may write the same file; the last one wins. The constructor opens it, so that
 /// a bad path is reported before anything moves; an older file stays as it is until commit() or show().
 ///
-/// It replaces regular files only. A symbolic link stays, and the file that it names is replaced. A pipe, a terminal or
-/// another character device (/dev/stdout, /dev/null) receives the bytes as they come. A folder, a block device, a
-/// socket and a pipe without a reader are refused, and so is a file that this process reads (note_input) or has open as
-/// another result. Not real-time safe. All members throw FileError.
+/// The name "-" is stdout. It replaces regular files only. A symbolic link stays, and the file that it names is
+/// replaced. A pipe, a terminal or another character device (/dev/stdout, /dev/null) receives the bytes as they come. A
+/// folder, a block device, a socket and a pipe without a reader are refused, and so is a file that this process reads
+/// (note_input) or has open as another result. Not real-time safe. All members throw FileError.
 class ResultFile {
  public:
   /// @param kind  for messages, as "CSV file"
@@ -74,6 +75,9 @@ class ResultFile {
   unsigned mode_{0};  ///< of the older file; 0: there is none
   int file_{-1};
 };
+
+/// Where a command's words for people go: stdout, or stderr once a result goes to "-".
+[[nodiscard]] std::FILE* for_people() noexcept;
 
 /// No result of this process may replace this file, or a file of this folder: a command reads it.
 void note_input(const std::filesystem::path& path);

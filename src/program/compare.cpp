@@ -107,7 +107,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
                                               : study::to_markdown(table));
   }
   if (runs_file) runs_file->write(study::runs_csv(study, runs));
-  cli::print("{}", study::to_text(table));
+  cli::print(files::for_people(), "{}", study::to_text(table));
   return exit_completed;
 }
 

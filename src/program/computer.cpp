@@ -178,9 +178,10 @@ int latency(const LatencyOptions& options) {
                                        .timing = statistics.summary(),
                                        .wire = run.driver().answer_times()};
   if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
-  cli::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
+  cli::print(files::for_people(), "{}",
+             options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
   if (!options.json) {
-    for (const std::string& line : run.driver().tally()) cli::print("{}\n", line);
+    for (const std::string& line : run.driver().tally()) cli::print(files::for_people(), "{}\n", line);
   }
   if (monitor) {
     run.release_driver();  // the guard reads the board back before it believes that the run is over

@@ -241,7 +241,7 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
       text += fmt::format("  {:<22}{}\n", "run folder", folder->path().string());
     }
     // If the terminal was closed, the exit status must still be the run's.
-    static_cast<void>(std::fputs(text.c_str(), stdout));
+    static_cast<void>(std::fputs(text.c_str(), files::for_people()));
   }
   for (const std::string& line : run.driver().tally()) spdlog::info("{}", line);
   // The guard reads the board back before it believes that the run is over.
