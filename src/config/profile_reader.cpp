@@ -1,9 +1,11 @@
 // Profiles of an experiment's file: a constant, a ramp, a step, points or a CSV file, over the time of the phase.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "config/reader.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
@@ -12,6 +14,23 @@ namespace {
 
 Number seconds(double value, Place place) {
   return {.value = value, .unit = "s", .range = rig::from_zero(day_s), .place = place};
+}
+
+/// The fields of a line of CSV, without quotation marks and blanks around them, and with points for decimal commas.
+std::vector<std::string> csv_fields(std::string_view line, char separator) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (c == separator && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += c == ',' ? '.' : c;
+    }
+  }
+  for (std::string& field : fields) field = rig::trimmed(field);
+  return fields;
 }
 
 /// Reads the profile of `outer`, whose row gives the values their unit and their range.
@@ -146,18 +165,35 @@ class ProfileReader {
     read_rows(name, *text, entry.place);
   }
 
+  /// CSV as a person writes it or a spreadsheet saves it: with a byte order mark, line ends of Windows, fields in
+  /// quotes,
+  /// ';' or tabs beside decimal commas. Empty rows and lines that begin with '#' are left out.
   void read_rows(const std::string& name, std::string_view text, Place place) {
+    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+    if (!rig::is_utf8(text)) {
+      reader_.fail(place, fmt::format("file \"{}\" is not UTF-8 text; save it as CSV in UTF-8", name));
+    }
+    char separator = 0;
+    std::size_t time_column = 0, value_column = 0;
     for (std::size_t row = 1; !text.empty(); ++row) {
-      std::string_view line = text.substr(0, text.find('\n'));
-      text.remove_prefix(line.size() < text.size() ? line.size() + 1 : text.size());
-      if (line.ends_with('\r')) line.remove_suffix(1);
-      if (row == 1 && line != "time_s,value") {
+      const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
+      text.remove_prefix(line.size());
+      text.remove_prefix(std::min<std::size_t>(text.starts_with("\r\n") ? 2 : 1, text.size()));
+      if (line.starts_with('#') || line.find_first_not_of(" \t,;") == line.npos) continue;
+      const bool header = separator == 0;
+      if (header) separator = line.find('\t') != line.npos ? '\t' : line.find(';') != line.npos ? ';' : ',';
+      const std::vector<std::string> fields = csv_fields(line, separator);
+      const auto number = [&fields](std::size_t n) {
+        return n < fields.size() ? rig::parse_number<double>(fields[n]) : std::nullopt;
+      };
+      if (header) {
+        time_column = static_cast<std::size_t>(std::ranges::find(fields, "time_s") - fields.begin());
+        value_column = static_cast<std::size_t>(std::ranges::find(fields, "value") - fields.begin());
+        if (std::max(time_column, value_column) < fields.size()) continue;
         reader_.fail(place, fmt::format("file \"{}\": the first line is wrong; give time_s,value", name));
       }
-      if (row == 1 || line.empty()) continue;
-      const std::size_t comma = std::min(line.find(','), line.size());
-      const auto time_s = rig::parse_number<double>(line.substr(0, comma));
-      const auto value = rig::parse_number<double>(line.substr(std::min(comma + 1, line.size())));
+      const auto time_s = number(time_column), value = number(value_column);
       if (!time_s || !value || !facts_.range.contains(*value)) {
         reader_.fail(place, fmt::format("file \"{}\", line {}: give a time in s and a value in {}", name, row,
                                         facts_.range.text()));

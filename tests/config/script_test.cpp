@@ -36,6 +36,35 @@ TEST_CASE("quantities take their own units only") {
   }
 }
 
+TEST_CASE("a profile's file is read as a person writes it and as spreadsheets save it") {
+  const auto points_of = [](const std::string& csv) {
+    const Script script = parse("[[phase]]\nname = \"x\"\nmotor = { file = \"p.csv\" }\nuntil = { lasts_s = 1 }\n",
+                                "test.toml", [&csv](const std::string&) { return csv; });
+    std::vector<std::pair<double, double>> points;
+    for (const auto& [time, value] : script.phases.at(0).motor->points) points.emplace_back(time.value, value.value);
+    return points;
+  };
+  const std::vector<std::pair<double, double>> wanted{{0.0, 0.25}, {1.5, 0.5}};
+  CHECK(points_of("time_s,value\n0,0.25\n1.5,0.5") == wanted);
+  CHECK(points_of("\xEF\xBB\xBFtime_s,value\r\n0,0.25\r\n1.5,0.5\r\n") == wanted);
+  CHECK(points_of("\xEF\xBB\xBF\"time_s\";\"value\"\r\n0;0,25\r\n\"1,5\";0,5\r\n;\r\n") == wanted);
+  CHECK(points_of("time_s\tvalue\r0\t0,25\r1.5\t0.5\r") == wanted);
+  CHECK(points_of("# from a spreadsheet, \xC3\xBC\n\n value , note, time_s\n0.25, a, 0\n# half\n0.5,\"b\", 1.5\n\n") ==
+        wanted);
+  CHECK(points_of("\"time_s\",\"value\"\n\"0\",\"0,25\"\n\"1,5\",\"0,5\"\n") == wanted);
+  CHECK_THROWS_WITH(points_of("\xFF\xFEt\0i\0"), Contains("\"p.csv\" is not UTF-8 text; save it as CSV in UTF-8"));
+  CHECK_THROWS_WITH(points_of(""), Contains("holds no points"));
+  CHECK_THROWS_WITH(points_of("\xEF\xBB\xBFtime_s,value\n"), Contains("holds no points"));
+  for (const char* wrong : {"time_s\n0\n", "time_s,phase\n0,idle\n", "0,0.25\n1.5,0.5\n", "time;value\n0;0\n"}) {
+    CHECK_THROWS_WITH(points_of(wrong), Contains("the first line is wrong; give time_s,value"));
+  }
+  for (const char* wrong : {"0;1.234,5", "0", "0;", "0;NaN", "0;2", "0;0,5x", "\"0;0,5", "0 0;0,5"}) {
+    INFO(wrong);
+    CHECK_THROWS_WITH(points_of(std::string("# a comment\ntime_s;value\n") + wrong + "\n"),
+                      Contains("\"p.csv\", line 3: "));
+  }
+}
+
 TEST_CASE("a script is read whole") {
   const Script script = parsed(R"(
 description = "d"
