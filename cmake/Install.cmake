@@ -45,7 +45,7 @@ if(HELP2MAN_EXECUTABLE)
   set(python_pages)
   if(ABS_HIL_PYTHON AND NOT SKBUILD)
     foreach(program abs_report abs_tune abs_learn abs_identify abs_benchmark abs_convert abs_watch abs_export-fmu abs_serve
-            abs_lab abs_rig)
+            abs_lab abs_log abs_rig)
       set(page ${CMAKE_BINARY_DIR}/man/${program}.1)
       add_custom_command(OUTPUT ${page}.gz
         COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from .figures import FigureOfMerit, figures
     from .identification import Identified, identify
     from .network import live
-    from .run import Run, Series, load, load_series
+    from .recording import load, load_series
+    from .run import Run, Series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many, simulate_series
     from .stepped import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .studies import StudyResults, load_study, simulate_run, study
@@ -32,7 +33,8 @@ globals().update(TYPES)
 _LATER = {'figures': ('FigureOfMerit', 'figures'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
-          'run': ('Run', 'Series', 'load', 'load_series'),
+          'recording': ('load', 'load_series'),
+          'run': ('Run', 'Series'),
           'stepped': ('Controller', 'Plant', 'PlantState', 'SlipInput', 'SlipOutput'),
           'studies': ('StudyResults', 'load_study', 'simulate_run', 'study'),
          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many',

@@ -1,11 +1,19 @@
 """The figures of merit of a braking run: the program's own table (src/analysis/braking_figures.hpp)."""
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
+
+import numpy as np
 
 from .core import _core
 
 #: the largest excess of slip over its reference; for formulas that use this figure
 OVERSHOOT = 'slip_overshoot'
+#: what holds for a run whose configuration is unknown
+PAPER_R2_M, DEFAULT_END_SPEED_M_S = 0.099, 0.3
+_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est', 'slip_ref',
+            'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
 #: endings of names, and their units
 _UNITS = {'_rad_s': 'rad/s', '_m_s': 'm/s', '_Nm': 'N m', '_N': 'N', '_m': 'm', '_s': 's', '': ''}
 
@@ -37,6 +45,29 @@ class FigureOfMerit:
 def figures() -> dict[str, FigureOfMerit]:
     """The figures by their names in summary and results, in the order of a study's results."""
     return {row['name']: FigureOfMerit(**row) for row in _core.figures()}
+
+
+def number_in(config: Mapping[str, Any], key: str, otherwise: float) -> float:
+    """A number of a configuration by dotted key."""
+    try:
+        return float(config[key])
+    except (KeyError, TypeError, ValueError):
+        return otherwise
+
+
+def r2_m(config: Mapping[str, Any]) -> float:
+    """The lower wheel's radius by a configuration; without one that of the paper's rig."""
+    return number_in(config, 'plant.r2_m', number_in(config, 'model.r2_m', PAPER_R2_M))
+
+
+def figures_of(columns: Mapping[str, np.ndarray], config: Mapping[str, Any], first: int = 0,
+               last: int | None = None) -> dict[str, float]:
+    """The figures of merit of rows [first, last), as a run's summary has them; NaN for one that they do not give."""
+    kept = {name: columns[name][first:last] for name in _COLUMNS}
+    kept['distance_m'] = kept['distance_m'] - (kept['distance_m'][0] if first else 0.0)
+    braking = (columns['phase'][first:last] == 'brake').astype(np.float64)
+    end_speed_m_s = number_in(config, 'experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S)
+    return dict(_core.metrics_of({**kept, 'braking': braking}, r2_m(config), end_speed_m_s))
 
 
 def heading_of(name: str) -> str:

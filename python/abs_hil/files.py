@@ -45,7 +45,7 @@ def read_text(path: pathlib.Path) -> str:
         content = file.read(_TEXT_MAX + 1)
     if len(content) > _TEXT_MAX:
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-    return content.decode('utf-8')
+    return content.decode('utf-8-sig')
 
 
 def make_folder(folder: pathlib.Path, option: str) -> None:

@@ -9,6 +9,7 @@ lcmtypes/*.lcm lists every field with its unit and range.
 import importlib
 import json
 import pkgutil
+from collections.abc import Iterator
 from typing import Any
 
 from .places import folders, place_of
@@ -41,6 +42,35 @@ def row_of(message: Any) -> dict[str, Any]:
     """The cycle in a telemetry_t: every quantity of the table and every signal of the controller, by name."""
     row = {name: getattr(message, name) for name in message.__slots__ if name not in ('names', 'value_count', 'values')}
     return {**row, **dict(zip(filter(None, message.names.split(',')), message.values))}
+
+
+def is_ours(data: bytes) -> bool:
+    """True for a message that begins as one of our types."""
+    return bytes(data[:8]) in _BY_FINGERPRINT
+
+
+def messages_of(run: Any) -> Iterator[tuple[int, str, bytes]]:
+    """(run time in us, channel, data) of the messages that a Run's summary, rows and events make."""
+    experiment, telemetry, event = (TYPES[name]() for name in ('experiment_t', 'telemetry_t', 'event_t'))
+    for name in ('experiment', 'controller', 'plant', 'backend', 'version'):
+        setattr(experiment, name, str(run.summary.get(name) or ''))
+    experiment.config_json = json.dumps(run.summary.get('config') or {})
+    yield 0, 'ABS_EXPERIMENT', experiment.encode()
+    telemetry.names, telemetry.value_count = ','.join(run.signals), len(run.signals)
+    fields = {name: type(getattr(telemetry, name)) for name in telemetry.__slots__ if name in run.columns and name != 'phase'}
+    waiting = list(run.events)
+    for row, (time_s, phase) in enumerate(zip(run['time_s'].tolist(), run['phase'])):
+        telemetry.cycle = telemetry.sequence = row
+        telemetry.stamp_ns, telemetry.phase = round(time_s * 1e9), PHASES.index(phase) if phase in PHASES else 0
+        for name, kind in fields.items():
+            value = run[name][row]
+            setattr(telemetry, name, kind(0 if kind is int and value != value else value))
+        telemetry.values = [float(run[name][row]) for name in run.signals]
+        yield round(time_s * 1e6), 'ABS_TELEMETRY', telemetry.encode()
+        while waiting and waiting[0].time_s <= time_s:
+            happened = waiting.pop(0)
+            event.time_s, event.kind, event.message, event.reason_text = time_s, happened.event, happened.text, happened.reason
+            yield round(time_s * 1e6), 'ABS_EVENT', event.encode()
 
 
 def decode(data: bytes) -> Any:

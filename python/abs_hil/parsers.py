@@ -37,7 +37,7 @@ def report() -> argparse.ArgumentParser:
     made = _parser('abs_report', 'Turns runs into a page with figures and tables, a plain table, or exports their rows')
     made._negative_number_matcher = re.compile(r'-[\d.]')  # --window -5:1 has a value
     made.add_argument('runs', metavar='RUN', nargs='+',
-                      help='run folders, series folders, CSV files of runs; or the folder of a study')
+                      help='run folders, series folders, files of runs (event log, CSV, MCAP, Parquet); or the folder of a study')
     made.add_argument('--output', metavar='FILE', default='',
                       help='file of the page (default: report.html) or of the exported rows (default: stdout)')
     made.add_argument('--force', action='store_true', help='replace existing files')
@@ -142,9 +142,10 @@ def benchmark() -> argparse.ArgumentParser:
 
 def convert() -> argparse.ArgumentParser:
     made = _parser('abs_convert', 'Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and others '
-                   '(docs/interchange.md). Between event logs and CSV: abs_hil convert.')
-    made.add_argument('input', nargs='?', metavar='IN', help='run folder, event log (.lcmlog) or CSV')
-    made.add_argument('output', metavar='OUT', help='file to write: .mcap or .parquet')
+                   '(docs/interchange.md)')
+    made.add_argument('input', nargs='?', metavar='IN', help='run folder, event log (.lcmlog), CSV, MCAP or Parquet; IN#2: the '
+                      'second run of a file')
+    made.add_argument('output', metavar='OUT', help='file to write: .csv, .mcap or .parquet')
     made.add_argument('--live', metavar='URL', help='record a running experiment from this LCM network; "" is the default one')
     made.add_argument('--prefix', default='ABS_', help='its telemetry.channel_prefix (default: %(default)s)')
     made.add_argument('--idle', type=float, metavar='S', help='with --live: end S seconds after the last message')
@@ -184,8 +185,8 @@ def export_fmu() -> argparse.ArgumentParser:
 def serve() -> argparse.ArgumentParser:
     made = _parser('abs_serve', 'Shows a running experiment, or a recorded one, as a scope in the browser (docs/serve.md). It '
                    'only watches unless --commands is given.')
-    made.add_argument('log', nargs='?', metavar='LOG', help='event log (.lcmlog), or a run folder that has one, to play instead '
-                      'of receiving')
+    made.add_argument('log', nargs='?', metavar='LOG', help='event log (.lcmlog), run folder, CSV, MCAP or Parquet to play '
+                      'instead of receiving; LOG#2: the second run of a file')
     made.add_argument('--speed', type=float, default=1.0, metavar='X', help='with LOG: times as fast as recorded; 0: at once '
                       '(default: %(default)g)')
     made.add_argument('--lcm-url', default='', metavar='URL', help="the LCM network (default: the run's own default)")
@@ -206,6 +207,15 @@ def lab() -> argparse.ArgumentParser:
     exercises = sorted(path.stem for path in (pathlib.Path(__file__).parent / 'lab' / 'exercises').glob('*.toml'))
     made.add_argument('--exercise', metavar='FILE', help='a TOML file that says what the page asks, hides and offers; or one that '
                       'is ready: ' + ', '.join(exercises))
+    return made
+
+
+def log() -> argparse.ArgumentParser:
+    made = _parser('abs_log', 'Says what recordings hold (docs/telemetry.md)')
+    info = made.add_subparsers(dest='command', required=True, metavar='info').add_parser(
+        'info', help='format, runs, duration, channels, gaps, result', allow_abbrev=False)
+    info.add_argument('files', nargs='+', metavar='FILE', help="run folder, anybody's event log, CSV, MCAP or Parquet of a run")
+    info.add_argument('--json', action='store_true', help='print it as JSON: a list with an object for each file')
     return made
 
 

@@ -1,5 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_rig. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_log, abs_rig. `abs_hil report ...` starts them too."""
 import codecs
 import contextlib
 import errno
@@ -18,7 +18,7 @@ PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn':
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
-            'lab': 'abs_hil.lab.page', 'rig': 'abs_hil.rig', 'python_host': 'abs_hil.interchange.host'}
+            'lab': 'abs_hil.lab.page', 'log': 'abs_hil.log', 'rig': 'abs_hil.rig', 'python_host': 'abs_hil.interchange.host'}
 
 
 #: for encodings without them

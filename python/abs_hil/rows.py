@@ -1,11 +1,15 @@
-"""Reads the rows of a run's CSV with pandas, and says file and line of whatever is no row of a run."""
+"""Reads the rows of a CSV, as a run wrote it or a spreadsheet saved it, and says file and line of whatever is no row."""
 import csv
+import gzip
 import io
+import itertools
 import math
 import os
 import pathlib
-from collections.abc import Callable
-from dataclasses import dataclass
+import re
+import zlib
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,19 +18,23 @@ from .messages import QUANTITIES
 
 #: columns that every run's CSV has, whatever version wrote it; others may follow in any order
 CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None and row['since'] == '0.1')
-#: columns that hold texts
-TEXTS = ('phase', 'phase_name')
+#: columns that hold texts: of a run; of exported runs their name; of converted logs where a row came from
+TEXTS = ('phase', 'phase_name', 'run', 'channel', 'type')
 MOST_SHOWN = 40
 #: the latest time of a row: some other program's may count from 1970
 LAST_S = 2e9
+#: between the fields of a text that was put in order
+_SEPARATOR = '\x1f'
 
 
 @dataclass
 class Rows:
-    """columns: name -> float64, or texts for `phase` and `phase_name`, in the order of the file.
-    truncated: the last line has no end, as after a crash; it is no row."""
+    """columns: name -> float64, or texts for those in TEXTS, in the order of the file.
+    truncated: the last line has no end, as after a crash; it is no row.
+    notes: what else was left out."""
     columns: dict[str, np.ndarray]
     truncated: bool
+    notes: list[str] = field(default_factory=list)
 
     @property
     def time_s(self) -> np.ndarray:
@@ -37,73 +45,156 @@ class Rows:
         return self.columns['phase'] == 'brake'
 
 
-def read_rows(path: str | os.PathLike[str]) -> Rows:
-    """Raises ValueError with file and line: missing columns, fields that are no numbers, decreasing time, no row."""
-    import pandas
+@dataclass
+class _Text:
+    """lines: the numbers that the lines of `data` have in the file."""
+    data: bytes
+    separator: str
+    lines: Sequence[int]
+
+
+def read_rows(path: str | os.PathLike[str], needed: Sequence[str] = CONTRACT, only: Collection[str] = ()) -> Rows:
+    """A CSV as this program writes it, or a person or a spreadsheet: with a byte order mark, UTF-16, line ends of Windows,
+    fields in quotes, ';' or tabs beside decimal commas, comments (#), compressed by gzip. An empty field is unknown.
+
+    needed: the columns that it must have; without any its times are not checked. only: no others are read. Columns that
+    hold nothing but texts are left out.
+    Raises ValueError with file and line: missing columns, fields that are no numbers, decreasing time, no row.
+    """
     place = pathlib.Path(path)
     try:
         data = place.read_bytes()
     except OSError as error:
         raise ValueError(f'cannot read "{place}": {error.strerror}; give a run\'s CSV file or folder') from None
+    data, damaged = _unzipped(data) if data[:2] == b'\x1f\x8b' else (data, False)
+    wide = data[:2] in (b'\xff\xfe', b'\xfe\xff')
+    data = data.decode('utf-16', 'replace').encode() if wide else data.removeprefix(b'\xef\xbb\xbf')
+    if b'\n' not in data:
+        data = data.replace(b'\r', b'\n')
     end = data.rfind(b'\n') + 1
     truncated = end < len(data)
     data = data[:end]
-    names, first = _header(place, data, truncated)
-    if len(data) == first:
-        raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
-                         f'{place}:1: no rows after the header: the file holds no data of the run')
-    try:
-        rows = io.BytesIO(data)  # shares the bytes: a long run's rows fill the memory once
-        rows.seek(first)
-        types = {number: str if name in TEXTS else np.float64 for number, name in enumerate(names)}
-        unknown: dict[int, list[str]] = {number: [] if name in TEXTS else ['NaN'] for number, name in enumerate(names)}
-        frame = pandas.read_csv(rows, header=None, dtype=types, na_values=unknown,
-                                keep_default_na=False, float_precision='round_trip', quoting=csv.QUOTE_NONE,
-                                skip_blank_lines=False, encoding_errors='surrogateescape')
-        # pandas refuses a line that is longer than the one before, and fills up a shorter one: then commas are missing.
-        if frame.shape[1] != len(names) or data.count(b',', first) != len(frame) * (len(names) - 1):
-            raise ValueError
-        columns = {name: frame[number].to_numpy() for number, name in enumerate(names)}
-    except ValueError as error:
-        _refuse(place, data[first:], names)
-        raise ValueError(f'{place}: {error}') from None
-    check_times(columns['time_s'], lambda row: f'{place}:{row + 2}')
-    for name in {*TEXTS} & {*columns}:
-        texts = columns[name]  # few different ones
-        clean = {text: _core.clean_text(str(text).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for text in set(texts)}
-        columns[name] = np.array([clean[text] for text in texts], dtype=object)
-    return Rows(columns, truncated)
-
-
-def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str], int]:
-    """Names of the columns, and where the rows begin."""
-    first = body.find(b'\n') + 1
-    if first == 0:
+    if not data:
         raise ValueError(f'{place}:1: the file ends within its first line: the recording stopped before the first row'
                          if truncated else f'{place}:1: the file is empty: the run wrote nothing')
-    line = body[:first].rstrip(b'\r\n').removeprefix(b'\xef\xbb\xbf')  # a spreadsheet's byte order mark
-    names = [_core.clean_text(name) for name in line.split(b',')]
-    missing = [name for name in CONTRACT if name not in names]
+    plain = _Text(data, ',', range(1, 1 << 62))
+    try:
+        rows = _rows(place, plain if b'"' not in data else in_order(data), truncated, needed, only)
+    except ValueError:
+        rows = _rows(place, in_order(data), truncated, needed, only)
+    if damaged:
+        rows.notes.append(f'"{place}" is cut off; its readable part is used')
+    return rows
+
+
+def starts_of(columns: dict[str, np.ndarray]) -> list[int]:
+    """Where the runs of a table begin: where its column `run` changes."""
+    names = columns.get('run', np.empty(0))
+    return [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist()]
+
+
+def _unzipped(content: bytes) -> tuple[bytes, bool]:
+    """What can be read, and whether the rest is missing or damaged."""
+    parts = []
+    with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+        try:
+            while part := file.read1(1 << 16):
+                parts.append(part)
+        except (OSError, EOFError, zlib.error):
+            return b''.join(parts), True
+    return b''.join(parts), False
+
+
+def in_order(data: bytes) -> _Text:
+    """A text with points in its numbers, without quotes, comments and empty lines."""
+    separator, lines, kept = '', [], []
+    for number, line in enumerate(data.decode('utf-8', 'surrogateescape').split('\n'), 1):
+        line = line.rstrip('\r')
+        if line.startswith(('#', 'sep=')) or not line.strip(' \t,;"'):
+            continue
+        separator = separator or next((one for one in '\t;' if one in line), ',')
+        try:
+            fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True))
+        except csv.Error:
+            fields = line.split(separator)
+        while len(fields) > 1 and not fields[-1] and (not kept or len(fields) > kept[0].count(_SEPARATOR) + 1):
+            fields.pop()  # a spreadsheet's empty columns behind the last one
+        kept.append(_SEPARATOR.join(re.sub(r'^([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)$', r'\1.\2', one.strip()) for one in fields))
+        lines.append(number)
+    return _Text('\n'.join([*kept, '']).encode('utf-8', 'surrogateescape'), _SEPARATOR, lines)
+
+
+def _rows(place: pathlib.Path, text: _Text, truncated: bool, needed: Sequence[str], only: Collection[str]) -> Rows:
+    import pandas
+    names, first = _header(place, text, needed)
+    if len(text.data) == first:
+        raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
+                         f'{place}:1: no rows after the header: the file holds no data of the run')
+    wanted = [number for number, name in enumerate(names) if name and (not only or name in only)]
+    numbers = {number for number in wanted if names[number] not in TEXTS}
+    if not wanted:
+        return Rows({}, truncated)
+    try:
+        rows = io.BytesIO(text.data)  # shares the bytes: a long run's rows fill the memory once
+        rows.seek(first)
+        types = {number: np.float64 if number in numbers else str for number in wanted if names[number] in (*QUANTITIES, *TEXTS)}
+        unknown: dict[int, list[str]] = {number: [] for number in range(len(names))}
+        unknown.update((number, ['NaN', 'nan'] if names[number] == 'time_s' else ['NaN', 'nan', '']) for number in numbers)
+        frame = pandas.read_csv(rows, header=None, usecols=wanted, dtype=types, na_values=unknown, sep=text.separator,
+                                keep_default_na=False, float_precision='round_trip', low_memory=False, quoting=csv.QUOTE_NONE,
+                                skip_blank_lines=False, encoding_errors='surrogateescape')
+        # pandas refuses a line that is longer than the one before, and fills up a shorter one: then separators are missing.
+        if text.data.count(text.separator.encode(), first) != len(frame) * (len(names) - 1):
+            raise ValueError
+    except ValueError as error:
+        _refuse(place, text, first, names, numbers)
+        raise ValueError(f'{place}: {error}') from None
+    columns, notes = {}, []
+    for number in wanted:
+        name, values = names[number], frame[number]
+        if number in numbers and not pandas.api.types.is_numeric_dtype(values.dtype):
+            if pandas.to_numeric(values, errors='coerce').notna().any() or name in needed:
+                _refuse(place, text, first, names, {number})
+            notes.append(f'column {name} of "{place}" holds texts and is left out')
+            continue
+        columns[name] = values.to_numpy(dtype=np.float64 if number in numbers else object)
+    if needed:
+        for first, last in itertools.pairwise([*starts_of(columns), len(frame)]):
+            check_times(columns['time_s'][first:last], lambda row, first=first: f'{place}:{text.lines[first + row + 1]}')
+    for name in {*TEXTS} & {*columns}:
+        texts = columns[name]  # few different ones
+        clean = {one: _core.clean_text(str(one).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for one in set(texts)}
+        columns[name] = np.array([clean[one] for one in texts], dtype=object)
+    return Rows(columns, truncated, notes)
+
+
+def _header(place: pathlib.Path, text: _Text, needed: Sequence[str]) -> tuple[list[str], int]:
+    """Names of the columns, and where the rows begin."""
+    first = text.data.find(b'\n') + 1
+    names = [_core.clean_text(name.strip()) for name in text.data[:first].rstrip(b'\r\n').split(text.separator.encode())]
+    missing = [name for name in needed if name not in names]
+    if missing and len(missing) == len(needed):
+        raise ValueError(f'{place}:1: the first line names no column of a run; a run\'s CSV, as abs_hil --csv writes it, begins '
+                         f'with "{",".join(CONTRACT[:3])},…"')
     if missing:
         raise ValueError(f'{place}:1: the header lacks {", ".join(missing)}; a run\'s CSV, as abs_hil --csv writes it, '
                          f'begins with "{",".join(CONTRACT[:3])},…"')
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f'{place}:1: the header has the column {twice} twice')
+    if twice := [name for name in names if name and names.count(name) > 1]:
+        raise ValueError(f'{place}:1: the header has the column {twice[0]} twice')
     return names, first
 
 
-def _refuse(place: pathlib.Path, body: bytes, names: list[str]) -> None:
+def _refuse(place: pathlib.Path, text: _Text, first: int, names: list[str], numbers: set[int]) -> None:
     """Raises ValueError for the first line that is no row."""
-    for number, line in enumerate(body.split(b'\n')[:-1], 2):
-        fields = line.removesuffix(b'\r').split(b',')
-        for name, field in zip(names, fields):
+    for number, line in zip(text.lines[1:], text.data[first:].split(b'\n')[:-1]):
+        fields = line.removesuffix(b'\r').split(text.separator.encode())
+        for column, value in enumerate(fields[:len(names)]):
             try:
-                if name not in TEXTS:
-                    float(field)
+                if column in numbers and (value or names[column] == 'time_s'):
+                    float(value)
             except ValueError:
-                shown = _core.clean_text(field, MOST_SHOWN)
-                raise ValueError(f'{place}:{number}: {name}: "{shown}" is not a number (a run writes NaN for an unknown '
+                shown = _core.clean_text(value, MOST_SHOWN)
+                raise ValueError(f'{place}:{number}: {names[column]}: "{shown}" is not a number (a run writes NaN for an unknown '
                                  'value)') from None
         if len(fields) < len(names):
             raise ValueError(f'{place}:{number}: the row has {len(fields)} fields instead of {len(names)} and ends before '

@@ -1,10 +1,9 @@
 """A run's rows, summary and signals, from the simulator or from files."""
 from __future__ import annotations
 
-import itertools
-import os
 import pathlib
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from .files import write_whole
 from .messages import PHASES, QUANTITIES
 from .nesting import parse_json
 from .options import PathLike
-from .rows import TEXTS, check_times, read_rows
+from .rows import TEXTS
 
 if TYPE_CHECKING:
     import pandas
@@ -22,8 +21,31 @@ if TYPE_CHECKING:
 #: columns of every run's CSV, in order
 COLUMNS = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None)
 
+#: quantities that are whole numbers
+_WHOLE = frozenset(name for name, row in QUANTITIES.items() if row['type'] in ('integer', 'boolean'))
 #: side files are small; a larger file is not one, and must not fill the memory
 MOST_BYTES = 64 << 20
+
+
+@dataclass
+class Event:
+    """A line of a run folder's events.csv, or an event of a log. message: what the log says to people."""
+    time_s: float
+    event: str
+    phase: str
+    reason: str = ''
+    value: str = ''
+    name: str = ''  # the experiment's own name of the phase; empty in files of older versions
+    message: str = ''
+
+    @property
+    def unusual(self) -> bool:
+        """True for an event that is neither a change of phase nor the regular end."""
+        return self.event != 'phase' and not (self.event == 'limit' and self.phase == 'stopped')
+
+    @property
+    def text(self) -> str:
+        return self.message or f'{self.name or self.phase}: {self.reason}'
 
 
 class Run:
@@ -37,6 +59,9 @@ class Run:
     signals: names of the controller's own signals.
     notes:   what is missing or damaged, as sentences.
     folder:  where the run was read from; None for a simulated one.
+    events:  of a log or a converted file, in the order of time. start_ns: Unix time of its time 0; 0 if unknown.
+    losses:  what its recording lacks, as sentences with numbers. attachments: files in a converted file, by name.
+    truncated: the last row of its CSV was incomplete.
     """
 
     def __init__(self, columns: Mapping[str, np.ndarray], summary: Mapping[str, Any] | None = None,
@@ -49,6 +74,11 @@ class Run:
         self.config_toml = config_toml
         self.folder = folder
         self.name = name
+        self.events: list[Event] = []
+        self.start_ns = 0
+        self.losses: list[str] = []
+        self.attachments: dict[str, bytes] = {}
+        self.truncated = False
 
     @property
     def data(self) -> pandas.DataFrame:
@@ -124,9 +154,11 @@ class Series:
 
 
 def csv_bytes(columns: Mapping[str, np.ndarray], header: bool = True) -> bytes:
-    """The columns as CSV: a number is the shortest text that reads back bit-exactly, an unknown one is NaN."""
-    kept = [values.tolist() if values.dtype == object else np.ascontiguousarray(values, dtype=np.float64)
-            for values in columns.values()]
+    """The columns as CSV: a number is the shortest text that reads back bit-exactly, an unknown one is NaN. Quantities that
+    are whole numbers, and arrays of such, stay whole."""
+    kept = [values.tolist() if values.dtype == object else
+            np.ascontiguousarray(values, np.int64 if values.dtype.kind == 'i' or (name in _WHOLE and np.isfinite(values).all())
+                                 else np.float64) for name, values in columns.items()]
     return (','.join(_quoted(name) for name in columns) + '\n').encode() * header + _core.csv_rows(kept)
 
 
@@ -174,49 +206,9 @@ def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
     return flat
 
 
-def read_csv(path: PathLike) -> tuple[dict[str, np.ndarray], tuple[str, ...], list[str]]:
-    """(columns, signals, notes) of a run's CSV. ValueError, with file and line, for a file that is no run's."""
-    rows = read_rows(path)
-    notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if rows.truncated else []
-    return rows.columns, signals_of(list(rows.columns)), notes
-
-
-def signals_of(columns: list[str]) -> tuple[str, ...]:
-    """The controller's own signals: they follow the fixed columns and the phase's own name."""
-    return tuple(itertools.takewhile(_core.is_signal_name, columns[len(COLUMNS) + ('phase_name' in columns):]))
-
-
-def load(path: PathLike) -> Run:
-    """Loads a run folder, a run's CSV file or an event log (.lcmlog), whole or cut off; `Run.notes` says what is missing.
-
-    Raises ValueError for anything else, with the file, the place and the reason; so it does for a run folder whose files
-    are no longer those of its SHA256SUMS.
-    """
-    place = pathlib.Path(path)
-    if place.suffix == '.lcmlog':
-        return _load_log(place)
-    if not place.is_dir():
-        columns, signals, notes = read_csv(place)
-        return Run(columns, {}, signals, notes=notes, folder=place.parent, name=place.stem)
-    _core.check_seal(os.fsencode(place))
-    if not (place / 'run.csv').exists() and (place / 'run.lcmlog').exists():
-        run = _load_log(place / 'run.lcmlog')
-        run.notes.append('no run.csv: the rows are those of run.lcmlog')
-        run.name = place.resolve().name
-        return run
-    if not (place / 'run.csv').exists():
-        what = 'a series; load it with abs_hil.load_series' if (place / 'series.json').exists() else 'no run folder'
-        raise ValueError(f'"{place}" is {what} (it has no run.csv)')
-    columns, signals, notes = read_csv(place / 'run.csv')
-    summary: dict[str, Any] = {}
-    if (place / 'summary.json').exists():
-        try:
-            summary = read_object(place / 'summary.json')
-        except ValueError as error:
-            notes.append(f'summary.json is not used: {error}')
-    else:
-        notes.append('no summary.json: names, figures and configuration are unknown')
-    return Run(columns, summary, signals, notes=notes, folder=place, name=place.resolve().name)
+def signals_of(columns: Iterable[str]) -> tuple[str, ...]:
+    """The controller's own signals among the columns."""
+    return tuple(name for name in columns if _core.is_signal_name(name) and name not in TEXTS)
 
 
 def read_text(path: pathlib.Path) -> str:
@@ -224,7 +216,7 @@ def read_text(path: pathlib.Path) -> str:
     try:
         if (size := path.stat().st_size) > MOST_BYTES:
             raise ValueError(f'{path}: {size} bytes are too many for this kind of file')
-        return path.read_bytes().decode('utf-8', 'replace')
+        return path.read_bytes().decode('utf-8-sig', 'replace')
     except OSError as error:
         raise ValueError(f'cannot read "{path}": {error.strerror}') from None
 
@@ -239,58 +231,3 @@ def read_object(path: pathlib.Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise ValueError(f'{path}:1: the file must contain a JSON object')
     return data
-
-
-def runs_in_series(place: pathlib.Path) -> tuple[list[pathlib.Path], list[str]]:
-    """The folders of the complete runs of a series, in order, and notes about the others. Raises ValueError if there is
-    none."""
-    try:
-        folders = sorted(path for path in place.iterdir() if path.name.startswith('run-') and path.is_dir())
-    except (FileNotFoundError, NotADirectoryError):
-        folders = []
-    except OSError as error:
-        raise ValueError(f'cannot read "{place}": {error.strerror}') from None
-    if not folders:
-        raise ValueError(f'"{place}" is no series folder (it has no run-0001/)')
-    complete = [path for path in folders if (path / 'run.csv').exists() and (path / 'summary.json').exists()]
-    notes = [f'{path} is not complete and is left out' for path in folders if path not in complete]
-    if not complete:
-        raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
-    return complete, notes
-
-
-def load_series(folder: PathLike) -> Series:
-    """Loads the complete runs of a series' folder, in order; `Series.notes` names those that are left out."""
-    place = pathlib.Path(folder)
-    folders, notes = runs_in_series(place)
-    runs = [load(path) for path in folders]
-    try:
-        index = read_object(place / 'series.json')
-    except ValueError:
-        index = {}
-        notes.append('no readable series.json')
-    return Series(runs, index, notes)
-
-
-def _load_log(path: pathlib.Path) -> Run:
-    columns, signals, rows, experiment, unreadable, damage, lacks = _core.read_log(str(path))
-    notes = [f'the rest of the log is not used: {damage}'] if damage else []
-    if lacks:
-        notes.append(f'{lacks}: another version of abs_hil recorded it')
-    if unreadable:
-        notes.append(f'{unreadable} messages of the log cannot be read and are left out')
-    if rows == 0:
-        raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil'
-                         + (', or another version of abs_hil recorded it' if unreadable else ''))
-    check_times(columns['time_s'], lambda row: f'{path}: message {row + 1} of its telemetry')
-    name_phases(columns)
-    summary: dict[str, Any] = {}
-    if experiment:
-        names = ('experiment', 'controller', 'plant', 'backend')
-        summary = {name: text.decode(errors='replace') for name, text in zip(names, experiment)}
-        try:
-            summary['config'] = parse_json(experiment[-1])
-        except ValueError:
-            notes.append('the configuration in the log is not valid JSON')
-    notes.append('an event log has no figures of merit')
-    return Run(columns, summary, tuple(signals), notes=notes, folder=path.parent, name=path.stem)

@@ -9,10 +9,9 @@
 #include <cstdint>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "abs_hil/event_t.hpp"
-#include "abs_hil/experiment_t.hpp"
 #include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/quantities.hpp"
@@ -26,6 +25,7 @@
 #include "files/result_file.hpp"
 #include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
@@ -36,43 +36,103 @@ namespace abs_hil::python {
 
 namespace {
 
-/// Rows and description of the run in an event log.
+/// A quantity that is no column of the CSV.
+struct OtherColumn {
+  std::vector<double> reals{};
+  std::vector<std::int64_t> wholes{};
+};
+
+/// The rows of one run in an event log, and its other messages.
 class LogColumns {
  public:
+  /// @param whole  with every quantity and the events' numbers and times, not only the CSV's columns
+  explicit LogColumns(bool whole) : whole_(whole) {}
+
   void take(const telemetry::LogEvent& event) {
-    if (event.channel.ends_with("TELEMETRY")) {
+    const std::int64_t fingerprint = telemetry::fingerprint_of(event.data);
+    bool ours = false;
+    telemetry::for_each_message_type(
+        [&]<class Message>() { ours = ours || fingerprint == static_cast<std::int64_t>(Message::getHash()); });
+    if (fingerprint == static_cast<std::int64_t>(telemetry_t::getHash())) {
       telemetry_t message{};
-      if (!decode(event, message)) return;
-      if (columns_.rows() == 0) {
-        signals_ = telemetry::signals_of(message);
-        for (const std::string_view name : telemetry::lacking_in(message)) {
-          lacks_.append(lacks_.empty() ? "the log lacks " : ", ").append(name);
-        }
+      if (telemetry::decode_checked(event.data, message).empty()) {
+        take_cycle(event, message);
+      } else {
+        ++unreadable_;
       }
-      note_phase(message);
-      columns_.consume(telemetry::to_record(message), message.distance_m);
-    } else if (event.channel.ends_with("EXPERIMENT") && experiment_.empty()) {
-      experiment_t message{};
-      if (!decode(event, message)) return;
-      experiment_ = {message.experiment, message.controller, message.plant, message.backend, message.config_json};
-    } else if (event.channel.ends_with("EVENT")) {
-      event_t message{};
-      decode(event, message);
+    } else if (ours) {
+      messages_.emplace_back(event.data.begin(), event.data.end());
+    } else if (event.channel.ends_with("TELEMETRY") || event.channel.ends_with("EXPERIMENT") ||
+               event.channel.ends_with("EVENT")) {
+      ++unreadable_;
     }
   }
-  py::tuple result(const std::string& damage) {
-    for (std::string& text : experiment_) {
-      if (&text != &experiment_.back()) text = rig::clean_text(text);
+  py::dict result() {
+    py::dict result;
+    result["rows"] = columns_.rows();
+    py::dict columns = columns_.take({.phases = phases_, .signals = signals_});
+    std::size_t n = 0;
+    if (whole_) {
+      rig::for_each_quantity([&](const auto& row) {
+        if (row.in_csv()) return;
+        const py::str name(row.name.data(), row.name.size());
+        if constexpr (std::is_floating_point_v<rig::ValueOf<std::decay_t<decltype(row)>>>) {
+          columns[name] = array_of(std::move(others_[n++].reals));
+        } else {
+          columns[name] = array_of(std::move(others_[n++].wholes));
+        }
+      });
+      columns["log_event"] = array_of(std::move(numbers_));
+      columns["log_time_us"] = array_of(std::move(times_us_));
     }
-    const std::size_t rows = columns_.rows();
-    // The configuration is JSON, as bytes: it may be damaged.
-    py::list experiment;
-    for (const std::string& text : experiment_) experiment.append(py::bytes(text));
-    return py::make_tuple(columns_.take({.phases = phases_, .signals = signals_}), signals_, rows, experiment,
-                          unreadable_, damage, lacks_);
+    result["columns"] = columns;
+    result["signals"] = signals_;
+    result["channel"] = rig::clean_text(channel_);
+    result["start_us"] = start_us_;
+    result["cycles"] = array_of(std::move(cycles_));
+    result["sequences"] = array_of(std::move(sequences_));
+    py::list messages;
+    for (const std::string& message : messages_) messages.append(py::bytes(message));
+    result["messages"] = messages;
+    result["unreadable"] = unreadable_;
+    result["late"] = late_;
+    result["lacks"] = lacks_;
+    return result;
   }
 
  private:
+  void take_cycle(const telemetry::LogEvent& event, telemetry_t& message) {
+    if (cycles_.empty()) {
+      channel_ = event.channel;
+      if (event.timestamp_us > 0) start_us_ = event.timestamp_us - std::llround(message.time_s * 1e6);
+      signals_ = telemetry::signals_of(message);
+      for (const std::string_view name : telemetry::lacking_in(message)) {
+        lacks_.append(lacks_.empty() ? "the log lacks " : ", ").append(name);
+      }
+    } else if (message.cycle <= cycles_.back() && message.sequence <= sequences_.back()) {  // it comes twice, or late
+      ++late_;
+      return;
+    }
+    cycles_.push_back(message.cycle);
+    sequences_.push_back(message.sequence);
+    note_phase(message);
+    const rig::CycleRecord record = telemetry::to_record(message);
+    columns_.consume(record, message.distance_m);
+    if (!whole_) return;
+    const rig::CycleParts<const rig::CycleRecord> parts{record, message.distance_m, message.sequence};
+    std::size_t n = 0;
+    rig::for_each_quantity([&](const auto& row) {
+      if (row.in_csv()) return;
+      OtherColumn& other = others_[n++];
+      if constexpr (std::is_floating_point_v<rig::ValueOf<std::decay_t<decltype(row)>>>) {
+        other.reals.push_back(row.at(parts));
+      } else {
+        other.wholes.push_back(static_cast<std::int64_t>(row.at(parts)));
+      }
+    });
+    numbers_.push_back(event.number);
+    times_us_.push_back(event.timestamp_us);
+  }
   /// A phase that is not planned, as after a fault, keeps the number of the one before.
   void note_phase(telemetry_t& message) {
     constexpr std::int32_t most_phases = 10'000;
@@ -84,78 +144,71 @@ class LogColumns {
       named = {static_cast<rig::Phase>(message.phase), rig::clean_text(message.phase_name)};
     }
   }
-  template <class Message>
-  bool decode(const telemetry::LogEvent& event, Message& message) {
-    const bool whole = telemetry::decode_checked(event.data, message).empty();
-    if (!whole) ++unreadable_;
-    return whole;
-  }
 
+  bool whole_;
   ColumnSink columns_;
+  std::array<OtherColumn, rig::quantity_count - rig::csv_columns.size()> others_{};
+  std::vector<std::int64_t> numbers_;
+  std::vector<std::int64_t> times_us_;
+  std::vector<std::int64_t> cycles_;
+  std::vector<std::int64_t> sequences_;
+  std::vector<std::string> messages_;
+  std::string channel_;
+  std::int64_t start_us_{0};
   std::vector<rig::NamedPhase> phases_;
   std::vector<std::string> signals_;
-  std::vector<std::string> experiment_;
   std::string lacks_;
   std::size_t unreadable_{0};
+  std::size_t late_{0};
 };
 
-/// (columns, signals, rows, [experiment, controller, plant, backend, configuration], number of unreadable messages,
-/// what is wrong with the rest of the file; empty: nothing, what an older log lacks; empty: nothing)
-py::tuple read_log(const std::string& path) {
-  LogColumns columns;
+/// One run of an event log, by its number from 0: rows (their number), columns, signals, channel, start_us (Unix time),
+/// cycles and sequences (of the rows), messages (the run's others, encoded), unreadable and late (numbers of messages),
+/// lacks (quantities of this version); and of the log: runs, parts (appended recordings), damage (why the rest is not
+/// read). Texts are empty if there is nothing to say.
+py::dict read_log(const std::string& path, std::size_t run, bool whole) {
+  LogColumns columns(whole);
+  telemetry::RunSeparator separator;
+  std::size_t parts = 0;
   std::string damage;
   {
     const py::gil_scoped_release release;
     telemetry::EventLogReader log(path);
     try {
-      while (const auto event = log.next()) columns.take(*event);
+      while (const auto event = log.next()) {
+        parts = event->part + 1;
+        if (separator.run_of(*event) == run) columns.take(*event);
+      }
       damage = log.cut();
     } catch (const telemetry::RecordingError& error) {
       damage = error.what();
     }
   }
-  return columns.result(damage);
+  py::dict result = columns.result();
+  result["runs"] = separator.runs();
+  result["parts"] = parts;
+  result["damage"] = damage;
+  return result;
 }
 
-/// What an event log says besides the rows of read_log: numbers of its messages, and events.
-py::dict read_log_facts(const std::string& path) {
-  std::vector<std::int64_t> cycles;
-  std::vector<std::int64_t> sequences;
-  std::vector<std::int64_t> event_sequences;
-  std::int64_t start_us = 0;
-  std::vector<std::pair<double, event_t>> events;
-  {
-    const py::gil_scoped_release release;
-    telemetry::EventLogReader log(path);
-    try {
-      while (const auto event = log.next()) {
-        telemetry_t message{};
-        event_t reported{};
-        if (event->channel.ends_with("TELEMETRY") && telemetry::decode_checked(event->data, message).empty()) {
-          if (cycles.empty() && event->timestamp_us > 0)
-            start_us = event->timestamp_us - std::llround(message.time_s * 1e6);
-          cycles.push_back(message.cycle);
-          sequences.push_back(message.sequence);
-        } else if (event->channel.ends_with("EVENT") && telemetry::decode_checked(event->data, reported).empty()) {
-          event_sequences.push_back(reported.sequence);
-          events.emplace_back(reported.time_s, reported);
-        }
-      }
-    } catch (const telemetry::RecordingError&) {  // read_log says so
-    }
+/// The events of a log, one after the other: (run, part, number, time in us, channel, data). `cut` as of the reader.
+class LogEvents {
+ public:
+  explicit LogEvents(const std::string& path) : log_(path) {}
+  py::tuple next() {
+    const auto event = log_.next();
+    if (!event) throw py::stop_iteration();
+    const auto& data = event->data;
+    return py::make_tuple(runs_.run_of(*event), event->part, event->number, event->timestamp_us,
+                          rig::clean_text(event->channel),
+                          py::bytes(reinterpret_cast<const char*>(data.data()), data.size()));
   }
-  py::list told;
-  for (const auto& [time_s, event] : events) {
-    told.append(py::make_tuple(time_s, py::bytes(event.kind), event.reason, py::bytes(event.message)));
-  }
-  py::dict facts;
-  facts["start_us"] = start_us;
-  facts["cycles"] = array_of(std::move(cycles));
-  facts["sequences"] = array_of(std::move(sequences));
-  facts["event_sequences"] = array_of(std::move(event_sequences));
-  facts["events"] = told;
-  return facts;
-}
+  [[nodiscard]] const std::string& cut() const { return log_.cut(); }
+
+ private:
+  telemetry::EventLogReader log_;
+  telemetry::RunSeparator runs_;
+};
 
 /// Writes a result as the program does. `write` gets the name of the file to fill, or an empty one for a stream, and
 /// returns bytes to append.
@@ -208,31 +261,37 @@ py::dict metrics_of(const py::dict& columns, double r2_m, double end_speed_m_s) 
   return result;
 }
 
-/// Rows of CSV from columns: arrays of numbers, or lists of texts.
+/// Rows of CSV from columns: arrays of numbers, whole ones if they are so, or lists of texts.
 py::bytes csv_rows(const py::list& columns) {
-  std::vector<Column> numbers(columns.size());
-  std::vector<std::vector<std::string>> texts(columns.size());
+  using Wholes = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+  std::vector<std::variant<Column, Wholes, std::vector<std::string>>> all_columns;
   std::size_t rows = 0;
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    if (py::isinstance<py::list>(columns[c])) {
-      texts[c] = py::cast<std::vector<std::string>>(columns[c]);
-      rows = texts[c].size();
+  for (const py::handle column : columns) {
+    rows = py::len(column);
+    if (py::isinstance<py::list>(column)) {
+      all_columns.emplace_back(py::cast<std::vector<std::string>>(column));
+    } else if (py::cast<py::array>(column).dtype().kind() == 'i') {
+      all_columns.emplace_back(py::cast<Wholes>(column));
     } else {
-      numbers[c] = py::cast<Column>(columns[c]);
-      rows = static_cast<std::size_t>(numbers[c].size());
+      all_columns.emplace_back(py::cast<Column>(column));
     }
   }
   std::string all;
-  for (std::size_t r = 0; r < rows; ++r) {
-    telemetry::CsvRow row;
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      if (texts[c].empty()) {
-        row({}, numbers[c].at(static_cast<py::ssize_t>(r)));
-      } else {
-        row.text(texts[c].at(r));
-      }
+  const auto add = [&all](const auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, double>) {
+      all += telemetry::csv_number(value);
+    } else if constexpr (std::is_integral_v<Value>) {
+      all += std::to_string(value);
+    } else {
+      all += rig::csv_field(value);
     }
-    all += row.row();
+  };
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < all_columns.size(); ++c) {
+      if (c > 0) all += ',';
+      std::visit([&](const auto& values) { add(values.at(r)); }, all_columns[c]);
+    }
     all += '\n';
   }
   return all;
@@ -260,8 +319,23 @@ void add_files(py::module_& module) {
       },
       py::arg("error"), py::arg("place"), py::arg("deed"));
   module.def("write_result", &write_result, py::arg("path"), py::arg("write"), py::arg("probe"));
-  module.def("read_log", &read_log, py::arg("path"));
-  module.def("read_log_facts", &read_log_facts, py::arg("path"));
+  module.def("read_log", &read_log, py::arg("path"), py::arg("run"), py::arg("whole"));
+  py::class_<LogEvents>(module, "LogEvents")
+      .def(py::init<const std::string&>(), py::arg("path"))
+      .def("__iter__", [](LogEvents& events) -> LogEvents& { return events; })
+      .def("__next__", &LogEvents::next)
+      .def_property_readonly("cut", &LogEvents::cut);
+  module.def(
+      "named_recording",
+      [](const std::string& name) {
+        const telemetry::NamedRecording named(name);
+        return py::make_tuple(py::bytes(named.path), named.run);
+      },
+      py::arg("name"));
+  module.def(
+      "chosen_run",
+      [](const std::string& name, std::size_t runs) { return chosen_run(telemetry::NamedRecording(name), runs); },
+      py::arg("name"), py::arg("runs"));
   module.def("metrics_of", &metrics_of, py::arg("columns"), py::arg("r2_m"), py::arg("end_speed_m_s"));
   module.def("csv_rows", &csv_rows, py::arg("columns"));
   module.def("profile_of", &profile_of, py::arg("text"), py::arg("key"));

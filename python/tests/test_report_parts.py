@@ -76,7 +76,7 @@ def changes_along(tmp_path, key, profile, truth=True):
                      .replace('nan', 'NaN'))
     (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
     run = files.RunFiles(tmp_path / 'run.csv', 'run', config={'plant.r2_m': '0.1', key: profile})
-    return survey.survey(run, read_rows(run.csv)).changes
+    return survey.survey(run, run.rows()).changes
 
 
 def test_changes_over_time_stand_at_their_instants(tmp_path):
@@ -121,7 +121,7 @@ def pulses_of(tmp_path, torque_Nm, slip_ref):
         lines.append(','.join(map(str, row.values())))
     (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
     run = files.RunFiles(tmp_path / 'run.csv', 'run')
-    return [(name, values['brake_start_s']) for name, values in survey.survey(run, read_rows(run.csv)).brakings]
+    return [(name, values['brake_start_s']) for name, values in survey.survey(run, run.rows()).brakings]
 
 
 def test_a_brake_that_acts_again_after_a_release_begins_a_pulse(tmp_path):

@@ -1,4 +1,5 @@
 """Rows of a run's CSV: as they were written, or refused with file and line."""
+import gzip
 import random
 
 import numpy as np
@@ -72,7 +73,7 @@ def test_a_file_that_is_no_run_is_refused_with_file_and_line(tmp_path):
     assert refusal(tmp_path, HEADER + good + '1,brake,3\n') == ('FILE:3: the row has 3 fields instead of 19 and ends before '
                                                                'omega2_rad_s')
     assert refusal(tmp_path, HEADER + row('1') + ',9\n') == 'FILE:2: the row has more than the header\'s 19 fields'
-    assert refusal(tmp_path, HEADER + good + '\n').startswith('FILE:3: time_s: "" is not a number')
+    assert refusal(tmp_path, HEADER + good + '\n\n' + row('x') + '\n').startswith('FILE:5: time_s: "x" is not a number')
     assert refusal(tmp_path, HEADER.strip() + ',slip\n' + row('1') + ',1\n') == 'FILE:1: the header has the column slip twice'
     with pytest.raises(ValueError, match='cannot read .*give a run\'s CSV file or folder'):
         read_rows(tmp_path / 'none.csv')
@@ -93,7 +94,7 @@ def test_any_bytes_are_refused_or_read_with_a_number_for_every_line_and_times_in
             assert str(error)
             continue
         read_anyway += 1
-        rows = bytes(data).count(b'\n') - 1
+        rows = sum(bool(line.strip(b' \t,;"\r')) for line in bytes(data).split(b'\n')) - 1
         assert all(len(values) == rows for values in found.columns.values())
         assert (np.diff(found.columns['time_s']) >= 0).all()
     assert 20 < read_anyway < 380
@@ -103,3 +104,51 @@ def test_texts_are_made_fit_to_show(tmp_path):
     text = (HEADER + row('1', 'b\x1b[2J') + '\n').encode() + (row('2', 'x' * 99) + '\n').encode()
     phases = read(tmp_path, text.replace(b'b\x1b', b'\xff\x1b')).columns['phase'].tolist()
     assert phases == ['\ufffd\ufffd[2J', 'x' * 40 + '\u2026']
+
+
+PLAIN = HEADER.strip() + ',I_m\n' + ''.join(f'{row(number / 4)},{number * 0.1!r}\n' for number in range(5)).replace('14,', 'NaN,')
+
+
+def spreadsheet(separator, decimal):
+    """What a spreadsheet saves: CRLF, quoted texts and, where the decimal mark is the separator, numbers."""
+    lines = []
+    for line in PLAIN.strip().split('\n'):
+        fields = [one.replace('.', decimal) if one[0] in '-0123456789' else f'"{one}"' for one in line.split(',')]
+        lines.append(separator.join(f'"{one}"' if separator in one else one for one in fields))
+    return '\r\n'.join(lines) + '\r\n'
+
+
+@pytest.mark.parametrize('data', [
+    b'\xef\xbb\xbf' + spreadsheet(',', '.').encode(), b'\xef\xbb\xbf' + spreadsheet(';', ',').encode(), spreadsheet('\t', ',').encode(),
+    spreadsheet(',', ',').encode(), spreadsheet(';', '.').encode('utf-16'), ('\ufeff' + spreadsheet(';', ',')).encode('utf-16-be'),
+    gzip.compress(PLAIN.encode()), PLAIN.replace('\n', '\r').encode(), b'sep=;\r\n' + spreadsheet(';', ',').encode(),
+    b'# saved by hand, \xe4\n\n' + PLAIN.replace(',', ' , ').encode() + b'\n\n', PLAIN.replace('NaN', '').encode(),
+    PLAIN.replace('NaN', 'nan').encode(), (spreadsheet(';', ',').replace('\r\n', ';;;\r\n') + ';' * 22 + '\r\n').encode(),
+    '\n'.join(f'{number or ""},{line}' for number, line in enumerate(PLAIN.split('\n')) if line).encode() + b'\n'])  # pandas's index
+def test_what_people_and_spreadsheets_make_of_a_csv_reads_the_same(tmp_path, data):
+    plain, found = read(tmp_path, PLAIN), read(tmp_path, data)
+    assert not found.truncated and found.notes == []
+    for name, values in plain.columns.items():
+        assert found.columns[name].dtype == values.dtype
+        assert list(found.columns[name]) == list(values) or np.array_equal(found.columns[name], values, equal_nan=True), name
+
+
+def test_columns_of_texts_are_left_out_and_damaged_numbers_are_not(tmp_path):
+    text = PLAIN.replace('I_m', 'note,I_m').replace('e-3,', 'e-3,good,')
+    found = read(tmp_path, text)
+    assert 'note' not in found.columns and 'I_m' in found.columns and 'column note of ' in found.notes[0]
+    assert refusal(tmp_path, text.replace('good', '5', 1)).startswith('FILE:3: note: "good" is not a number')
+    assert refusal(tmp_path, PLAIN.replace('0.1', 'x')).startswith('FILE:3: I_m: "x" is not a number')
+
+
+def test_a_spreadsheet_s_thousands_are_refused_with_their_line(tmp_path):
+    text = spreadsheet(';', ',').replace('0,25', '1.000,25')
+    assert refusal(tmp_path, '\ufeff# x\r\n' + text).startswith('FILE:4: time_s: "1.000,25" is not a number')
+
+
+def test_a_table_of_several_runs_may_begin_again_in_time(tmp_path):
+    lines = (HEADER + row('1') + '\n' + row('2') + '\n' + row('0.5') + '\n').split('\n')
+    named = [f'{name},{line}' for name, line in zip(('run', 'a', 'a', 'b'), lines)]
+    assert read(tmp_path, '\n'.join(named) + '\n').columns['run'].tolist() == ['a', 'a', 'b']
+    named[3] = named[3].replace('b,', 'a,', 1)
+    assert refusal(tmp_path, '\n'.join(named) + '\n') == 'FILE:4: time_s decreases from 2 to 0.5'

@@ -1,4 +1,4 @@
-// `abs_hil replay` and `abs_hil convert`: what was recorded.
+// `abs_hil replay`: what was recorded, once more.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -11,6 +11,7 @@
 #include "replay/replay.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/event_log.hpp"
 
 namespace abs_hil::program {
 
@@ -18,7 +19,7 @@ namespace {
 
 /// The event log of a run folder that is as it was recorded; any other path as it is.
 std::string log_in(const std::string& recording) try {
-  const std::filesystem::path path(recording);
+  const std::filesystem::path path(telemetry::NamedRecording(recording).path);
   std::error_code error;
   files::note_input(path);
   if (!std::filesystem::is_directory(path, error)) return recording;
@@ -39,11 +40,6 @@ struct ReplayCommand {
   std::vector<std::string> assignments{};
   bool check{false};
   std::optional<std::string> csv_file{};
-};
-
-struct ConvertCommand {
-  std::string from{};
-  std::string to{};
 };
 
 int check_again(const replay::RecordedRun& run) {
@@ -71,7 +67,7 @@ int replay_run(const ReplayCommand& command) {
   }
   const std::vector<replay::RerunCycle> rerun =
       replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
-  cli::print("{}", replay::report(run, settings, rerun));
+  cli::print(files::for_people(), "{}", replay::report(run, settings, rerun));
   if (csv) {
     for (const replay::RerunCycle& cycle : rerun) csv->consume(cycle.record, cycle.distance_m);
     csv->finish();
@@ -79,30 +75,11 @@ int replay_run(const ReplayCommand& command) {
   return exit_completed;
 }
 
-int convert(const ConvertCommand& command) {
-  const std::string from = log_in(command.from);
-  const std::filesystem::path folder = std::filesystem::path(command.to).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder)) {
-    throw config::ConfigError("convert: OUT = " + command.to + ": there is no folder " + folder.string() +
-                              "; create it first");
-  }
-  if (std::filesystem::path(command.to).extension() != ".csv") {
-    throw config::ConfigError("convert: OUT = " + command.to + ": give a name that ends in .csv, .mcap or .parquet");
-  }
-  const telemetry::ConversionCounts counts = telemetry::log_to_csv(from, command.to);
-  note(counts.cut);
-  if (!counts.lacks.empty()) spdlog::warn("'{}' lacks {}: another version wrote it", from, counts.lacks);
-  cli::print("{} events", counts.events);
-  if (counts.raw > 0) cli::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
-  cli::print("\n");
-  return exit_completed;
-}
-
 }  // namespace
 
 Action add_replay(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ReplayCommand>();
-  parser.add("recording", &o->recording, "event log (--log), or a run folder (--out)",
+  parser.add("recording", &o->recording, "event log (--log) or run folder (--out); LOG#2: the second run of a log",
              {.type = "LOG", .required = true});
   parser.add("--check", &o->check, "run the recorded configuration again and check that all commands are bit-equal");
   parser.add("--controller,--controllers", &o->controller, "use another slip controller",
@@ -112,13 +89,6 @@ Action add_replay(cli::Parser& parser, const Words&) {
   parser.add("--out,--csv", &o->csv_file, "write the replayed commands, with the columns of a run's CSV",
              {.type = "FILE.csv", .excludes = {"--check"}});
   return [o] { return replay_run(*o); };
-}
-
-Action add_convert(cli::Parser& parser, const Words&) {
-  const auto o = std::make_shared<ConvertCommand>();
-  parser.add("from", &o->from, "event log or run folder", {.type = "IN", .required = true});
-  parser.add("to", &o->to, "FILE.csv, FILE.mcap or FILE.parquet", {.type = "OUT", .required = true});
-  return [o] { return convert(*o); };
 }
 
 }  // namespace abs_hil::program

@@ -31,8 +31,8 @@ constexpr std::array table{
                "make the configured board, or every board found, safe and verify it; ends the run that drives it",
                &add_safe},
     Subcommand{"replay", "feed a recorded run to its own or another controller, open loop", &add_replay},
-    Subcommand{"convert", "convert an event log (.lcmlog) to CSV; a run to .mcap or .parquet (abs_convert --help)",
-               &add_convert},
+    Subcommand{"log", "say what recordings hold: log info FILE"},
+    Subcommand{"convert", "convert a recorded run to .csv, .mcap or .parquet, or record a running one"},
     Subcommand{"export-fmu",
                "write the simulated rig, or with --controller a slip controller, as an FMU for other tools"},
     Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits"},
@@ -47,13 +47,6 @@ constexpr std::array table{
     Subcommand{"learn", "train a small controller in simulation, from nothing but trial and error"},
 };
 
-/// `abs_hil convert` itself knows event logs and CSV. Other formats need libraries that only the Python package has.
-bool converts_in_python(std::span<char* const> arguments) {
-  return std::ranges::any_of(arguments, [](std::string_view argument) {
-    return argument.ends_with(".mcap") || argument.ends_with(".parquet") || argument.starts_with("--live");
-  });
-}
-
 }  // namespace
 
 std::span<const Subcommand> subcommands() noexcept { return table; }
@@ -63,7 +56,7 @@ std::optional<int> start_python_program(int argc, char** argv) {
   const std::string_view name = argv[1];
   const bool listed =
       std::ranges::any_of(table, [&](const Subcommand& row) { return row.add == nullptr && row.name == name; });
-  if (!listed && !(name == "convert" && converts_in_python({argv + 2, argv + argc}))) return std::nullopt;
+  if (!listed) return std::nullopt;
 
   const std::string file = fmt::format("abs_{}", name);
   std::error_code error;

@@ -53,7 +53,6 @@ Action add_commission(cli::Parser& parser, const Words& words);
 Action add_init_rig(cli::Parser& parser, const Words& words);
 Action add_safe(cli::Parser& parser, const Words& words);
 Action add_replay(cli::Parser& parser, const Words& words);
-Action add_convert(cli::Parser& parser, const Words& words);
 Action add_send(cli::Parser& parser, const Words& words);
 
 /// Runs an experiment and returns the exit status. Throws what its parts throw: see program.cpp.

@@ -80,8 +80,6 @@ class Collector {
 
   void take_cycle(telemetry_t cycle, const std::string& channel) {
     if (channel_.empty()) channel_ = channel;
-    if (channel != channel_)
-      fail("telemetry on two channels, " + channel_ + " and " + channel + "; give a recording of one run");
     const auto expected = static_cast<std::int64_t>(run_.cycles.size());
     if (cycle.cycle != expected) fail(gap(expected, cycle));
     if (cycle.phase < telemetry_t::PHASE_IDLE || cycle.phase > telemetry_t::PHASE_FAULT) {
@@ -102,7 +100,6 @@ class Collector {
     const std::string where =
         "cycle " + std::to_string(found.cycle) + " follows where cycle " + std::to_string(expected) + " is expected: ";
     if (expected == 0) return where + "a replay needs the run from its first cycle";
-    if (found.cycle == 0) return where + "a second run begins; give a recording of one run";
     if (found.sequence == expected) {
       return where +
              "not every cycle was published (telemetry.decimation, or drops); record with --log and "
@@ -131,10 +128,15 @@ class Collector {
 
 }  // namespace
 
-RecordedRun read_run(const std::filesystem::path& recording) {
-  Collector collector(recording.string());
-  return collector.finish(
-      telemetry::for_each_event(recording, [&collector](const telemetry::LogEvent& event) { collector.take(event); }));
+RecordedRun read_run(const std::string& recording) {
+  const telemetry::NamedRecording named(recording);
+  telemetry::RunSeparator all, runs;
+  telemetry::for_each_event(named.path, [&all](const telemetry::LogEvent& event) { all.run_of(event); });
+  const std::size_t chosen = chosen_run(named, all.runs());
+  Collector collector(named.path);
+  return collector.finish(telemetry::for_each_event(named.path, [&](const telemetry::LogEvent& event) {
+    if (runs.run_of(event) == chosen) collector.take(event);
+  }));
 }
 
 config::Settings settings_of(const RecordedRun& run, const Changes& changes) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,9 +26,9 @@ struct RecordedRun {
   bool virtual_time{false};                 ///< a run with --fast: exact wake-ups, computations take no time
 };
 
-/// Reads an event log. Throws telemetry::RecordingError if it is damaged,
-/// holds no run or several runs, or lacks a cycle.
-[[nodiscard]] RecordedRun read_run(const std::filesystem::path& recording);
+/// Reads a run of an event log, FILE or FILE#N. Throws telemetry::RecordingError if the log is damaged, holds no run, or several of
+/// which none is named, or if the run lacks a cycle.
+[[nodiscard]] RecordedRun read_run(const std::string& recording);
 
 /// Changes that a replay makes to the recorded configuration.
 struct Changes {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -20,16 +21,21 @@ class RecordingError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Of an event: sync, number, timestamp, length of channel, length of data.
+inline constexpr std::size_t event_header_bytes = 28;
+
 /// One event of an LCM event log.
 struct LogEvent {
+  std::size_t part{0};  ///< recordings in one file, from 0: `lcm-logger --append` numbers its events from 0 again
   std::int64_t number{0};
   std::int64_t timestamp_us{0};  ///< since 1970
-  std::string channel;
-  std::vector<std::uint8_t> data;
+  std::string channel{};
+  std::vector<std::uint8_t> data{};
 };
 
 /// Reads LCM's event logs. It checks sync words, lengths and event numbers. lcm::LogFile skips damage silently instead.
-/// A killed program leaves a part of a message at the end of its log: there the log ends, and `cut` says so.
+/// A killed program leaves a part of a message at the end of its log: there the log, or this part of it, ends, and
+/// `cut` says so.
 class EventLogReader {
  public:
   /// Throws RecordingError when the file cannot be opened.
@@ -37,25 +43,74 @@ class EventLogReader {
 
   /// Returns the next event, or nothing at the end. Throws RecordingError if the file is damaged.
   [[nodiscard]] std::optional<LogEvent> next();
-  /// After the end: where the last message is cut off, in words; empty if it is whole.
+  /// After the end: where messages are cut off, in words; empty if all are whole.
   [[nodiscard]] const std::string& cut() const noexcept { return cut_; }
 
  private:
   [[nodiscard]] std::string place(const std::string& what) const;
   [[noreturn]] void fail(const std::string& what) const { throw RecordingError(place(what)); }
-  std::optional<LogEvent> end_cut_off();
+  enum class Behind : std::uint8_t { nothing, events, recording };
+  std::size_t read_into(void* to, std::size_t size);
+  [[nodiscard]] bool header_begins() const;
+  Behind look_behind(std::uint64_t end);
+  void note_cut(const std::string& what) { cut_.append(cut_.empty() ? "" : "; ").append(place(what)); }
+  std::optional<LogEvent> end_here(std::string damage);
 
   std::filesystem::path path_;
   std::ifstream file_;
   std::uint64_t size_{0};
+  std::array<std::uint8_t, event_header_bytes> header_{};  ///< of the event at `at_`, read ahead
+  std::size_t header_read_{0};
   std::uint64_t at_{0};
-  std::int64_t events_{0};
+  std::size_t part_{0};
+  std::int64_t events_{0};  ///< least number of the next event
   std::string cut_{};
 };
 
 /// Calls `take` for every event of a log, in order. Returns EventLogReader::cut. Throws RecordingError, even after some
 /// calls.
 std::string for_each_event(const std::filesystem::path& log, const std::function<void(const LogEvent&)>& take);
+
+/// Tells the runs of a recording apart: one after another, in appended recordings, of several rigs at once. Runs have
+/// numbers from 0 in the order in which they begin in the file.
+///
+/// A telemetry_t belongs to the run of its channel's prefix that began at the same instant of the monotonic clock, if
+/// its cycle is later than the run's last one, or to a run whose sequence it continues. Any other telemetry_t begins a
+/// run, and so does an experiment_t with sequence 0. Other events belong to the run of their prefix that was heard
+/// last; without one, to the run of the file that began last.
+class RunSeparator {
+ public:
+  /// The event's run; 0 before the first run begins.
+  std::size_t run_of(const LogEvent& event);
+  /// Number of runs that have begun.
+  [[nodiscard]] std::size_t runs() const noexcept { return runs_.size(); }
+
+ private:
+  struct Run {
+    std::string prefix{};
+    std::size_t heard{0};            ///< number of the event that was heard last
+    bool described{false};           ///< by an experiment_t
+    std::uint64_t start_ns{0};       ///< on the monotonic clock
+    std::int64_t first_stamp_ns{0};  ///< of the first telemetry_t
+    bool heard_cycle{false};         ///< a telemetry_t
+    std::int64_t cycle{0};           ///< of the last one
+    std::int64_t sequence{0};
+  };
+  std::vector<Run> runs_{};
+  std::size_t events_{0};
+};
+
+/// A recording as a command names it: FILE, or FILE#N for one of its runs.
+struct NamedRecording {
+  explicit NamedRecording(const std::string& name);
+
+  std::string path;
+  std::size_t run{0};  ///< from 1; 0: the only one
+};
+
+/// Which of `runs` runs is meant, from 0. Throws RecordingError, with what to give, if none is named and there are
+/// several, or if there are fewer.
+[[nodiscard]] std::size_t chosen_run(const NamedRecording& recording, std::size_t runs);
 
 /// Appends an event to the bytes of a log, as LCM does.
 void append_event(std::string& log, std::int64_t number, std::int64_t timestamp_us, std::string_view channel,

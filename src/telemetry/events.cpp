@@ -49,11 +49,11 @@ EventCsv::EventCsv(std::filesystem::path path, rig::RunNames names)
 void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   const auto event = detector_.observe(record);
   if (!event) return;
-  text_ += CsvRow::text_of(std::round(record.time_s * 1e6) / 1e6);  // in us, without the rounding of its arithmetic
+  text_ += csv_number(std::round(record.time_s * 1e6) / 1e6);  // in us, without the rounding of its arithmetic
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
   // Quoted, because the text of a reason may contain a comma.
   text_.append(",\"").append(event->reason).append("\",");
-  text_ += CsvRow::text_of(record.reason_value);
+  text_ += csv_number(record.reason_value);
   text_.append(",").append(names_.phase_of(record)) += '\n';
 }
 

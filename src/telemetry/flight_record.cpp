@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* record_kind = "flight record";
 
-void add_number(std::string& row, double value) { row.append(",").append(CsvRow::text_of(value)); }
+void add_number(std::string& row, double value) { row.append(",").append(csv_number(value)); }
 
 std::string extra_columns(const rig::CycleRecord& r) {
   std::string row = ',' + std::to_string(r.sequence) + ',' + std::to_string(r.stamp_ns);

@@ -119,6 +119,28 @@ class Outputs(ProgramTest):
         result = self.run_program('--fast', '--no-lcm', '--summary', '/dev/stdout')
         self.assertEqual(json.JSONDecoder().raw_decode(result.stdout)[0]['result'], 'completed')
 
+    def test_a_result_named_with_a_dash_goes_to_stdout_alone(self):
+        log = self.folder / 'run.lcmlog'
+        brief = ('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60')
+        self.run_program(*brief, '--log', log)
+        comparison = ('compare', '--controllers', 'pi', '--repeat', '1')
+        for command in (*((*brief, option) for option in ('--csv', '--log', '--summary')), ('replay', log, '--csv'),
+                        *((*comparison, option) for option in ('--json', '--csv', '--markdown', '--runs'))):
+            with self.subTest(command):
+                file = self.folder / 'file'
+                whole = self.run_program(*command, file)
+                for stdout in (subprocess.PIPE, open(self.folder / 'out', 'w+b')):
+                    result = subprocess.run([PROGRAM, *map(str, command), '-'], stdout=stdout, stderr=subprocess.PIPE,
+                                            cwd=self.folder, timeout=60)
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                    said = result.stdout if stdout == subprocess.PIPE else (self.folder / 'out').read_bytes()
+                    self.assertEqual(said, file.read_bytes())
+                    self.assertIn(whole.stdout.strip(), result.stderr.decode())
+        self.assertFalse((self.folder / '-').exists())
+        result = self.run_program(*brief, '--csv', '-', '--summary', '-')
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("summary '-': another result goes into the same file", result.stderr)
+
     def test_an_older_file_survives_a_run_that_is_refused(self):
         older = self.folder / 'older'
         for option in ('--csv', '--log', '--summary'):

@@ -91,7 +91,7 @@ def quantity_in_an_older_log(copy, program, older):
     converted.unlink(missing_ok=True)
     said = subprocess.run([program, 'convert', older, converted], env=copy.environment, check=True, capture_output=True,
                           text=True)
-    assert 'lacks made_up_Nm' in said.stderr, said.stderr
+    assert 'lacks made_up_Nm' in said.stdout, said.stdout
     assert {row['made_up_Nm'] for row in columns_of(converted)} == {'NaN'}
     said = subprocess.run([program, 'replay', older, '--check'], env=copy.environment, capture_output=True, text=True)
     assert said.returncode == 0 and 'lacks made_up_Nm' in said.stderr, said.stdout + said.stderr

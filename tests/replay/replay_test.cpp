@@ -351,7 +351,22 @@ TEST_CASE("recordings that do not hold the whole run are refused with the reason
   CHECK(read_run(scratch / "run.lcmlog").cut.empty());
   CHECK_THAT(read_bytes(whole.substr(0, whole.size() - 20)).cut, Contains("cut off"));
   CHECK_THROWS_WITH(read_bytes(""), Contains("no telemetry"));
-  CHECK_THROWS_WITH(read_bytes(whole + whole), Contains("damaged: event number"));
+  CHECK_THROWS_WITH(read_bytes(whole + whole), Contains("holds 2 runs: give"));
+}
+
+TEST_CASE("one run of a recording with several is replayed by its number") {
+  const TemporaryFolder scratch;
+  record_run(scratch / "first.lcmlog", {});
+  record_run(scratch / "second.lcmlog", {{"control.controller=pi"}});
+  const std::string first = content(scratch / "first.lcmlog"), second = content(scratch / "second.lcmlog");
+  const std::string both = scratch / "both.lcmlog";
+  std::ofstream(both, std::ios::binary) << first.substr(0, first.size() - 20) << second;
+  for (const auto& [name, controller] : {std::pair{both + "#1", "adaptive"}, std::pair{both + "#2", "pi"}}) {
+    const RecordedRun run = read_run(name);
+    CHECK(run.experiment.controller == controller);
+    CHECK(check(run).equal);
+  }
+  CHECK_THROWS_WITH(read_run(both + "#3"), Catch::Matchers::Contains("has no run 3"));
 }
 
 TEST_CASE("64 random bytes anywhere give an error or a difference, never a crash, and rarely pass unnoticed") {

@@ -1,17 +1,14 @@
-// From an event log to the CSV of the same run.
+// Event logs: damaged, cut off, appended to one another, and with several runs.
 
-#include <sys/resource.h>
+#include "telemetry/event_log.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <csignal>
 #include <fstream>
 #include <iterator>
 
+#include "abs_hil/experiment_t.hpp"
+#include "abs_hil/telemetry_t.hpp"
 #include "catch.hpp"
-#include "files/result_file.hpp"
-#include "telemetry/csv_sink.hpp"
-#include "telemetry/event_log.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/message_stream.hpp"
@@ -30,10 +27,9 @@ std::string content(const fs::path& path) {
 
 void put(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
 
-/// A log with all kinds of messages, and a CSV of the same run.
-void record(const fs::path& log_path, const fs::path& csv_path, std::uint64_t cycles = 1200) {
+/// A log with all kinds of messages.
+void record(const fs::path& log_path, std::uint64_t cycles = 1200) {
   LogOutlet log(log_path, 1'000'000);
-  CsvSink csv(csv_path);
   MessageStream stream(
       {}, {{0, 0, "paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"}}, {});
   stream.add(log);
@@ -46,125 +42,14 @@ void record(const fs::path& log_path, const fs::path& csv_path, std::uint64_t cy
     if (n == 13) r.truth.slip = -0.0;
     if (n == 14) r.truth.slip = 5e-324;
     stream.consume(r, 0.1 * static_cast<double>(n));
-    csv.consume(r, 0.1 * static_cast<double>(n));
   }
   stream.answer_command(rig::Reason::none, "quoted \"text\", with comma", 1.0);
   stream.finish();
-  csv.finish();
-}
-
-std::vector<std::string> lines_of(const fs::path& path) {
-  std::vector<std::string> lines;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) lines.push_back(line);
-  return lines;
-}
-
-TEST_CASE("the CSV of a log begins with the whole rows of --csv, and every other channel has its file") {
-  const abs_hil::test::TemporaryFolder scratch;
-  record(scratch / "run.lcmlog", scratch / "own.csv");
-  const ConversionCounts counts = log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
-  CHECK(counts.raw == 0);
-  CHECK(counts.lacks.empty());
-  const std::vector<std::string> own = lines_of(scratch / "own.csv"), made = lines_of(scratch / "made.csv");
-  REQUIRE(own.size() == 1201);
-  REQUIRE(made.size() == own.size());
-  for (std::size_t n = 0; n < own.size(); ++n) REQUIRE(made[n].starts_with(own[n] + ','));
-  CHECK(made[0].ends_with(
-      ",measured_ns,phase_index,upper_edge_age_ns,lower_edge_age_ns,log_event,log_time_us,channel,type"));
-  CHECK(made[8].find(",1007000040,0,") != std::string::npos);  // a board's own time
-  const std::vector<std::string> events = lines_of(scratch / "made.ABS_EVENT.csv");
-  CHECK(events.back().find("\"quoted \"\"text\"\", with comma\"") != std::string::npos);
-  CHECK(counts.events == 1200 + lines_of(scratch / "made.ABS_EXPERIMENT.csv").size() + events.size() +
-                             lines_of(scratch / "made.ABS_STATUS.csv").size() - 4 /* lines of "two lines", headers */);
-}
-
-TEST_CASE("names of phases and signals follow the columns of --csv as they do there") {
-  const abs_hil::test::TemporaryFolder scratch;
-  const rig::RunNames names{.phases = {{rig::Phase::brake, "brake-low"}}, .signals = {"I_m", "zeta_N"}};
-  {
-    LogOutlet log(scratch / "run.lcmlog", 0);
-    CsvSink csv(scratch / "own.csv", 0, names);
-    ExperimentInfo info{};
-    info.names = names;
-    MessageStream stream({}, info, {});
-    stream.add(log);
-    for (std::uint64_t n = 0; n < 10; ++n) {
-      rig::CycleRecord r = test::sample_record(n);
-      r.control.signals = {0.5, static_cast<double>(n)};
-      stream.consume(r, 0.1);
-      csv.consume(r, 0.1);
-    }
-    stream.finish();
-    csv.finish();
-  }
-  log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
-  const std::vector<std::string> own = lines_of(scratch / "own.csv"), made = lines_of(scratch / "made.csv");
-  REQUIRE(made.size() == 11);
-  for (std::size_t n = 0; n < own.size(); ++n) CHECK(made[n].starts_with(own[n] + ','));
-}
-
-TEST_CASE("unknown types and damaged messages are kept as hexadecimal digits") {
-  const abs_hil::test::TemporaryFolder scratch;
-  telemetry_t m{};
-  EncodeBuffer buffer;
-  const auto bytes = buffer.encode(m);
-  std::string log;
-  append_event(log, 0, 5, "OTHER", std::vector<std::uint8_t>{1, 2, 3, 0xFF});
-  append_event(log, 4, -5, "ABS_TELEMETRY", bytes);
-  append_event(log, 5, 6, "ABS_TELEMETRY", bytes.first(bytes.size() - 1));
-  append_event(log, 9, 7, "EMPTY", {});
-  files::write_result(scratch / "odd.lcmlog", "event log", log);
-  const ConversionCounts counts = log_to_csv(scratch / "odd.lcmlog", scratch / "odd.csv");
-  CHECK(counts.events == 4);
-  CHECK(counts.raw == 3);
-  CHECK(lines_of(scratch / "odd.csv").size() == 2);
-  const std::vector<std::string> raw = lines_of(scratch / "odd.raw.csv");
-  REQUIRE(raw.size() == 4);
-  CHECK(raw[0] == "data_hex,log_event,log_time_us,channel,type");
-  CHECK(raw[1] == "010203ff,0,5,OTHER,raw");
-  CHECK(raw[3] == ",9,7,EMPTY,raw");
-}
-
-TEST_CASE("a log with another number of rigs keeps each channel in a file of its own") {
-  const abs_hil::test::TemporaryFolder scratch;
-  telemetry_t m{};
-  EncodeBuffer buffer;
-  const auto bytes = buffer.encode(m);
-  std::string log;
-  for (int n = 0; n < 6; ++n) append_event(log, n, n, n % 2 == 0 ? "A_TELEMETRY" : "B/TELEMETRY", bytes);
-  files::write_result(scratch / "two.lcmlog", "event log", log);
-  CHECK(log_to_csv(scratch / "two.lcmlog", scratch / "two.csv").raw == 0);
-  CHECK(fs::exists(scratch / "two.B_TELEMETRY.csv"));
-  CHECK(lines_of(scratch / "two.B_TELEMETRY.csv").size() == 4);
-  CHECK(lines_of(scratch / "two.csv").size() == 4);
-}
-
-TEST_CASE("channels whose names make the same file name get files of their own") {
-  const abs_hil::test::TemporaryFolder scratch;
-  telemetry_t m{};
-  EncodeBuffer buffer;
-  const auto bytes = buffer.encode(m);
-  std::string log;
-  std::int64_t n = 0;
-  for (const char* channel : {"MAIN", "A/B/C", "A_B/C", "A/B_C", "A_B_C"}) {
-    append_event(log, n, n, channel, bytes);
-    ++n;
-  }
-  files::write_result(scratch / "many.lcmlog", "event log", log);
-  CHECK(log_to_csv(scratch / "many.lcmlog", scratch / "many.csv").events == 5);
-  std::size_t files = 0;
-  for (const auto& entry : fs::directory_iterator(fs::path(scratch / "many.csv").parent_path())) {
-    if (entry.path().extension() != ".csv") continue;
-    ++files;
-    CHECK(lines_of(entry.path()).size() == 2);
-  }
-  CHECK(files == 5);
 }
 
 TEST_CASE("a log that is overwritten at any place is an error that names the place") {
   const abs_hil::test::TemporaryFolder scratch;
-  record(scratch / "run.lcmlog", scratch / "own.csv");
+  record(scratch / "run.lcmlog");
   const auto count_events = [&](const std::string& bytes) {
     put(scratch / "x.lcmlog", bytes);
     int events = 0;
@@ -193,7 +78,7 @@ TEST_CASE("a log that is overwritten at any place is an error that names the pla
 
 TEST_CASE("the log of a killed run is read up to its last whole message") {
   const abs_hil::test::TemporaryFolder scratch;
-  record(scratch / "run.lcmlog", scratch / "own.csv", 10);
+  record(scratch / "run.lcmlog", 10);
   const std::string whole = content(scratch / "run.lcmlog");
   std::vector<std::size_t> begins;
   for (std::size_t at = 0; at != std::string::npos; at = whole.find("\xED\xA1\xDA\x01", at + 1)) begins.push_back(at);
@@ -209,62 +94,143 @@ TEST_CASE("the log of a killed run is read up to its last whole message") {
   }
 }
 
-TEST_CASE("a log damaged anywhere is converted whole, up to its cut, or leaves the older file as it was") {
-  const abs_hil::test::TemporaryFolder scratch;
-  record(scratch / "run.lcmlog", scratch / "own.csv", 12);
-  const std::string whole = content(scratch / "run.lcmlog");
-  int refused = 0, converted = 0, cut = 0;
-  const auto convert = [&](const std::string& bytes) {
-    const fs::path folder = scratch / "made";
-    fs::create_directory(folder);
-    put(folder / "made.csv", "older");
-    put(scratch / "x.lcmlog", bytes);
-    ConversionCounts counts;
-    try {
-      counts = log_to_csv(scratch / "x.lcmlog", folder / "made.csv");
-    } catch (const RecordingError&) {
-      ++refused;
-      REQUIRE(content(folder / "made.csv") == "older");
-      REQUIRE(std::distance(fs::directory_iterator(folder), fs::directory_iterator()) == 1);
-      return;
-    }
-    // Every event has a row somewhere.
-    std::size_t rows = 0, files = 0;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      ++files;
-      const std::string text = content(entry.path());
-      for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) ++rows;
-    }
-    REQUIRE(rows >= counts.events + files);
-    ++(counts.cut.empty() ? converted : cut);
-    fs::remove_all(folder);
-  };
-  for (std::size_t at = 0; at < whole.size(); at += 17) {
-    std::string flipped = whole;
-    flipped[at] = static_cast<char>(flipped[at] ^ (1 << (at / 17 % 8)));
-    convert(flipped);
-    if (at % 3 == 0) convert(whole.substr(0, at));
+/// What a reader finds in a file: events by part, and its note.
+struct Found {
+  std::vector<std::size_t> events{};
+  std::string cut{};
+};
+
+Found read(const fs::path& path) {
+  Found found;
+  EventLogReader reader(path);
+  while (const auto event = reader.next()) {
+    found.events.resize(std::max(found.events.size(), event->part + 1));
+    ++found.events[event->part];
   }
-  CHECK(refused > 10);
-  CHECK(converted > 10);
-  CHECK(cut > 10);
+  found.cut = reader.cut();
+  return found;
 }
 
-TEST_CASE("a full disk leaves the older file of a conversion as it was") {
+TEST_CASE("a recording that was appended to another one is read whole, wherever the first one is cut off") {
   const abs_hil::test::TemporaryFolder scratch;
-  record(scratch / "run.lcmlog", scratch / "own.csv");
-  const fs::path folder = scratch / "made";
-  fs::create_directory(folder);
-  put(folder / "made.csv", "older");
-  rlimit limit{};
-  REQUIRE(::getrlimit(RLIMIT_FSIZE, &limit) == 0);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{.rlim_cur = 100'000, .rlim_max = limit.rlim_max};
-  REQUIRE(::setrlimit(RLIMIT_FSIZE, &small) == 0);
-  CHECK_THROWS_AS(log_to_csv(scratch / "run.lcmlog", folder / "made.csv"), files::FileError);
-  REQUIRE(::setrlimit(RLIMIT_FSIZE, &limit) == 0);
-  CHECK(content(folder / "made.csv") == "older");
-  std::signal(SIGXFSZ, handler);
+  record(scratch / "run.lcmlog", 10);
+  const std::string whole = content(scratch / "run.lcmlog");
+  std::vector<std::size_t> begins;
+  for (std::size_t at = 0; at != std::string::npos; at = whole.find("\xED\xA1\xDA\x01", at + 1)) begins.push_back(at);
+  const std::size_t events = begins.size();
+  begins.push_back(whole.size());
+  for (std::size_t cut = 4; cut <= whole.size(); ++cut) {
+    put(scratch / "x.lcmlog", whole.substr(0, cut) + whole);
+    const Found found = read(scratch / "x.lcmlog");
+    const auto before =
+        static_cast<std::size_t>(std::upper_bound(begins.begin(), begins.end(), cut) - begins.begin()) - 1;
+    INFO(cut);
+    REQUIRE(found.events == std::vector<std::size_t>{before, events});
+    REQUIRE(found.cut.empty() == (begins[before] == cut));
+    REQUIRE((found.cut.empty() ||
+             found.cut.find("appended to it, begins at byte " + std::to_string(cut)) != found.cut.npos));
+  }
+}
+
+TEST_CASE("damage in the middle is no appended recording") {
+  const abs_hil::test::TemporaryFolder scratch;
+  record(scratch / "run.lcmlog", 10);
+  const std::string whole = content(scratch / "run.lcmlog");
+  std::string damaged = whole;
+  damaged[whole.find("\xED\xA1\xDA\x01", 10)] = 'x';
+  put(scratch / "x.lcmlog", damaged + whole);
+  CHECK_THROWS_WITH(read(scratch / "x.lcmlog"), Catch::Matchers::Contains("no event begins here"));
+}
+
+/// A message of ours in a log. `start_ns` is the run's start on the monotonic clock.
+LogEvent cycle_of(std::int64_t n, std::int64_t start_ns, const std::string& prefix = "ABS_") {
+  telemetry_t m{};
+  m.cycle = m.sequence = n;
+  m.stamp_ns = start_ns + n * 1'000'000;
+  m.time_s = static_cast<double>(n) * 1e-3;
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(m);
+  return {.channel = prefix + "TELEMETRY", .data = {bytes.begin(), bytes.end()}};
+}
+
+LogEvent description_of(std::int64_t sequence, std::int64_t stamp_ns, const std::string& prefix = "ABS_") {
+  experiment_t m{};
+  m.sequence = sequence;
+  m.stamp_ns = stamp_ns;
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(m);
+  return {.channel = prefix + "EXPERIMENT", .data = {bytes.begin(), bytes.end()}};
+}
+
+LogEvent other(const std::string& channel) { return {.channel = channel, .data = {1, 2, 3}}; }
+
+LogEvent changed(LogEvent event, std::size_t at) {
+  event.data[at] ^= 0x40U;
+  return event;
+}
+
+/// The numbers of the runs of these events.
+std::vector<std::size_t> runs_of(const std::vector<LogEvent>& events) {
+  RunSeparator separator;
+  std::vector<std::size_t> runs;
+  for (const LogEvent& event : events) runs.push_back(separator.run_of(event));
+  return runs;
+}
+
+TEST_CASE("runs of a recording are told apart") {
+  using Runs = std::vector<std::size_t>;
+  const std::int64_t later = 77'000'000'000;
+  SECTION("one after the other, in virtual time, which begins at the same instant again") {
+    CHECK(runs_of({description_of(0, 0), cycle_of(0, 0), cycle_of(1, 0), description_of(1, 1'000'000),
+                   description_of(0, 0), cycle_of(0, 0), cycle_of(1, 0), cycle_of(2, 0)}) ==
+          Runs{0, 0, 0, 0, 1, 1, 1, 1});
+    CHECK(runs_of({cycle_of(0, 0), cycle_of(1, 0), cycle_of(0, 0), cycle_of(1, 0)}) == Runs{0, 0, 1, 1});
+  }
+  SECTION("a recording that begins and goes on in the middle of runs") {
+    CHECK(runs_of({cycle_of(700, 0), cycle_of(701, 0), cycle_of(900, later), cycle_of(901, later)}) ==
+          Runs{0, 0, 1, 1});
+    CHECK(runs_of({cycle_of(700, 0), cycle_of(701, 0), cycle_of(900, 0), description_of(3, 950'000'000)}) ==
+          Runs{0, 0, 0, 0});
+    CHECK(runs_of({description_of(3, 950'000'000), cycle_of(951, 0)}) == Runs{0, 0});
+    CHECK(runs_of({cycle_of(700, 0), description_of(0, later), cycle_of(0, later)}) == Runs{0, 1, 1});
+  }
+  SECTION("several rigs at once, by their prefixes and even without") {
+    CHECK(runs_of({description_of(0, 0, "A_"), cycle_of(0, 0, "A_"), description_of(0, 5, "B_"), cycle_of(0, 5, "B_"),
+                   cycle_of(1, 0, "A_"), other("B_EVENT"), other("A_EVENT"), other("CAMERA")}) ==
+          Runs{0, 0, 1, 1, 0, 1, 0, 1});
+    CHECK(runs_of({cycle_of(500, 0), cycle_of(3, later), cycle_of(501, 0), cycle_of(4, later), cycle_of(502, 0)}) ==
+          Runs{0, 1, 0, 1, 0});
+  }
+  SECTION("one damaged number, a late message and a message that comes twice begin no run") {
+    for (const std::size_t at : {9U, 17U, 25U, 33U}) {  // in stamp, sequence, cycle, time
+      CHECK(runs_of({cycle_of(0, 0), cycle_of(1, 0), changed(cycle_of(2, 0), at), cycle_of(3, 0), cycle_of(4, 0)}) ==
+            Runs{0, 0, 0, 0, 0});
+    }
+    CHECK(runs_of({cycle_of(5, 0), cycle_of(7, 0), cycle_of(6, 0), cycle_of(7, 0), cycle_of(8, 0)}) ==
+          Runs{0, 0, 0, 0, 0});
+  }
+  SECTION("without a run everything is run 0") { CHECK(runs_of({other("A"), other("")}) == Runs{0, 0}); }
+}
+
+TEST_CASE("a name chooses one of the runs of a recording") {
+  using Catch::Matchers::Contains;
+  const abs_hil::test::TemporaryFolder scratch;
+  put(scratch / "a#3", "");
+  CHECK(NamedRecording("x.lcmlog#2").path == "x.lcmlog");
+  CHECK(NamedRecording("x.lcmlog#2").run == 2);
+  for (const std::string& plain : {std::string("x"), std::string("x#"), std::string("x#0"), std::string("x#-1"),
+                                   std::string("x#b"), (scratch / "a#3").string()}) {
+    CHECK(NamedRecording(plain).path == plain);
+    CHECK(NamedRecording(plain).run == 0);
+  }
+  CHECK(chosen_run(NamedRecording("x"), 0) == 0);
+  CHECK(chosen_run(NamedRecording("x"), 1) == 0);
+  CHECK(chosen_run(NamedRecording("x#1"), 1) == 0);
+  CHECK(chosen_run(NamedRecording("x#3"), 3) == 2);
+  CHECK_THROWS_WITH(
+      chosen_run(NamedRecording("x"), 2),
+      Contains("holds 2 runs: give 'x#1' for the first, 'x#2' for the second;") && Contains("log info x"));
+  CHECK_THROWS_WITH(chosen_run(NamedRecording("x#4"), 3), Contains("has no run 4, it holds 3"));
 }
 
 }  // namespace

@@ -1,9 +1,6 @@
 """Logs for identification: what was measured and what was sent, from run folders, event logs and plain CSV files."""
-import gzip
 import hashlib
-import io
 import pathlib
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,9 +10,12 @@ import scipy.ndimage
 import scipy.signal
 
 from ..options import PathLike
-from ..run import Run, load, stretches
+from ..recording import CSV, kind_of, load, named
+from ..rows import read_rows
+from ..run import Run, stretches
 
 NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
+WANTED = {*NEEDED, 'phase', 'wheels_apart', 'phase_name', 'sample_valid', 'sample_time_s'}
 LEAST_ROWS = 200
 #: slower than this a log has no row in some window of the fit; its times are rather of another unit
 LONGEST_PERIOD_S = 0.05
@@ -72,7 +72,7 @@ class Log:
 
 
 def load_log(path: PathLike | Run) -> Log:
-    """Reads a Run, a run folder, an event log (.lcmlog) or a CSV file, gzip or not, with the columns time_s, upper_counts,
+    """Reads a Run, what abs_hil.load takes, or any CSV file, gzip or not, with the columns time_s, upper_counts,
     lower_counts, brake_pwm, motor_pwm and, if they are there, phase and wheels_apart. Row n holds the counts at time_s
     and the duties (0 to 1, as sent) from then on.
 
@@ -82,61 +82,19 @@ def load_log(path: PathLike | Run) -> Log:
         experiment = str(path.summary.get('experiment') or '')
         content = b''.join(np.ascontiguousarray(path.columns[name]).tobytes() for name in NEEDED if name in path.columns)
         return _log(pathlib.Path(path.folder or experiment or 'run'), path.columns, list(path.notes), content, experiment)
-    place = pathlib.Path(path)
-    read = (_from_run if place.is_dir() or place.suffix == '.lcmlog' else _from_csv)(place)
+    place, _ = named(path)
+    if kind_of(place) == CSV:
+        rows = read_rows(place, (), WANTED)
+        run = Run(rows.columns, notes=[f'the last row of "{place}" is incomplete and is left out'] * rows.truncated + rows.notes)
+    else:
+        run = load(path)
+    if 'upper_counts' not in run.columns and (place / 'run.lcmlog').exists():
+        run.columns = load(place / 'run.lcmlog').columns
+    content = next((file.read_bytes() for file in (place, place / 'run.csv', place / 'run.lcmlog') if file.is_file()), b'')
     try:
-        return _log(place, *read)
+        return _log(pathlib.Path(path), run.columns, run.notes, content, str(run.summary.get('experiment') or ''))
     except ValueError as error:
         raise ValueError(f'"{place}": {error}') from None
-
-
-def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
-    run = load(place)
-    content = next(file for file in (place, place / 'run.csv', place / 'run.lcmlog') if file.is_file()).read_bytes()
-    columns = run.columns
-    if 'upper_counts' not in columns and (place / 'run.lcmlog').exists():
-        columns = load(place / 'run.lcmlog').columns
-    notes = [note for note in run.notes if 'figures of merit' not in note]
-    return columns, notes, content, str(run.summary.get('experiment') or '')
-
-
-def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
-    import pandas
-    try:
-        content = place.read_bytes()
-    except OSError as error:
-        raise ValueError(f'cannot read "{place}": {error.strerror}') from None
-    text, cut = _unzipped(content) if content[:2] == b'\x1f\x8b' else (content, False)
-    notes = [f'"{place}" is cut off; its readable part is used'] if cut else []
-    if not text.endswith(b'\n') and b'\n' in text:
-        last = text.rindex(b'\n') + 1
-        if text[last:].count(b',') != text[:text.index(b'\n')].count(b','):
-            text = text[:last]
-            notes.append(f'the last row of "{place}" is incomplete and is left out')
-    try:
-        wanted = {*NEEDED, 'phase', 'wheels_apart', 'phase_name', 'sample_valid', 'sample_time_s'}
-        frame = pandas.read_csv(io.BytesIO(text), usecols=lambda name: name.strip() in wanted, skipinitialspace=True,
-                                float_precision='round_trip')
-    except Exception as error:  # pandas raises many kinds
-        raise ValueError(f'"{place}" is no CSV file of a log: {error}') from None
-    lines = text.splitlines()  # pandas fills up a short row
-    short = next((row for row, line in enumerate(lines) if line.strip() and line.count(b',') < lines[0].count(b',')), 0)
-    if short:
-        raise ValueError(f'"{place}": row {short} has {lines[short].count(b",") + 1} fields instead of {lines[0].count(b",") + 1}')
-    frame.columns = [name.strip() for name in frame.columns]
-    return {str(name): frame[name].to_numpy() for name in frame.columns}, notes, content, ''
-
-
-def _unzipped(content: bytes) -> tuple[bytes, bool]:
-    """What can be read, and whether the rest is missing or damaged."""
-    parts = []
-    with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
-        try:
-            while part := file.read1(1 << 16):
-                parts.append(part)
-        except (OSError, EOFError, zlib.error):
-            return b''.join(parts), True
-    return b''.join(parts), False
 
 
 def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], content: bytes, experiment: str) -> Log:

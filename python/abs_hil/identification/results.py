@@ -9,7 +9,8 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from ..run import Run, load
+from ..recording import load
+from ..run import Run
 from ..simulation import simulate
 from .found import Estimate, Identified
 from .parameters import DELAY, FORMS, WHEELS

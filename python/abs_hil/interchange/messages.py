@@ -49,6 +49,11 @@ def definition(fields: Iterable[tuple[str, str]]) -> str:
                    for column, name in field_names(comments).items())
 
 
+def columns_of(text: str) -> list[str]:
+    """The columns in a definition."""
+    return re.findall(r'^float64 \w+  # ([^:\n]*)', text, re.MULTILINE)
+
+
 def rows(columns: Sequence[np.ndarray]) -> list[bytes]:
     """One message a row of the columns, all of shape (rows,)."""
     table = np.column_stack([np.asarray(column, dtype='<f8') for column in columns])
@@ -65,6 +70,17 @@ def log(stamp_ns: int, level: int, name: str, text: str) -> bytes:
         data = word.encode() + b'\0'
         body += b'\0' * (-len(body) % 4) + struct.pack('<I', len(data)) + data
     return _LITTLE_ENDIAN + body + b'\0' * (-len(body) % 4) + struct.pack('<I', 0)
+
+
+def log_of(data: bytes) -> tuple[str, str]:
+    """(name, text) of a message that `log` made."""
+    body, place, texts = data[len(_LITTLE_ENDIAN):], struct.calcsize('<iIB'), []
+    for _ in range(2):
+        place += -place % 4
+        size, = struct.unpack_from('<I', body, place)
+        texts.append(body[place + 4:place + 3 + size].decode(errors='replace'))
+        place += 4 + size
+    return texts[0], texts[1]
 
 
 class Topics:

@@ -1,4 +1,5 @@
-"""abs_convert: runs as files for other tools. `abs_hil convert` starts it for OUT.mcap and OUT.parquet."""
+"""abs_convert: runs as files for other tools; `abs_hil convert` starts it."""
+import errno
 import pathlib
 import signal
 from typing import Any
@@ -6,8 +7,11 @@ from typing import Any
 from .. import parsers
 from ..files import write_whole
 from ..options import failed
+from ..recording import named
 
-TARGETS = ('.mcap', '.parquet')
+TARGETS = ('.csv', '.mcap', '.parquet')
+#: reasons for which a file cannot be written that are not the command's fault
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: list[str]) -> int:
@@ -15,9 +19,11 @@ def main(arguments: list[str]) -> int:
     output = pathlib.Path(given.output)
     try:
         if output.suffix not in TARGETS:
-            raise ValueError(f'OUT = {given.output}: give a name that ends in .mcap or .parquet')
+            raise ValueError(f'OUT = {given.output}: give a name that ends in .csv, .mcap or .parquet')
         if (given.input is None) == (given.live is None):
             raise ValueError('give either IN or --live URL')
+        if not output.parent.is_dir():
+            raise ValueError(f'OUT = {given.output}: there is no folder {output.parent}; create it first')
         if given.live is None and (given.idle is not None or given.seconds is not None):
             raise ValueError('--idle and --seconds belong to --live')
         if given.live is not None and output.suffix != '.mcap':
@@ -25,16 +31,25 @@ def main(arguments: list[str]) -> int:
         print(_record(given, output) if given.live is not None else _convert(given.input, output))
         return 0
     except (ValueError, OSError) as error:
-        return failed('abs_convert', error, 2 if isinstance(error, ValueError) else 3)
+        full = isinstance(error.__context__, OSError) and error.__context__.errno in FULL
+        return failed('abs_convert', error, 1 if full else 3 if isinstance(error, OSError) else 2)
 
 
 def _convert(path: str, output: pathlib.Path) -> str:
     from . import recorded
+    origin = named(path)[0].resolve()
+    if output.resolve() == origin or origin.is_dir() and output.resolve().parent == origin:
+        raise ValueError(f'OUT = {output}: this command reads it; give another file')
     read = recorded.read(path)
-    write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
-    write_whole(output, lambda name: write(read, name))
+    more = ''
+    if output.suffix == '.csv':
+        from .to_csv import to_csv
+        more = to_csv(read.run, path, output)
+    else:
+        write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
+        write_whole(output, lambda name: write(read, name))
     losses = '; '.join(read.losses)
-    return f'{len(read.run)} rows, {len(read.events)} events; lost: {losses or "nothing"}'
+    return f'{len(read.run)} rows, {len(read.events)} events{more}; lost: {losses or "nothing"}'
 
 
 def _record(given: Any, output: pathlib.Path) -> str:

@@ -3,37 +3,25 @@ import dataclasses
 import datetime
 import json
 import pathlib
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from ..core import _core
-from ..messages import PHASES, QUANTITIES, REASONS
+from ..messages import PHASES, QUANTITIES
 from ..nesting import parse_json
-from ..report.files import read_events
+from ..recording import load, read_events
 from ..rows import check_times
-from ..run import COLUMNS, Run, load
+from ..run import COLUMNS, Event, Run, csv_bytes
+from .mcap_file import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC
 from .messages import McapFile
 
-CYCLE_TOPIC, SIGNALS_TOPIC, EVENT_TOPIC = '/abs_hil/cycle', '/abs_hil/signals', '/abs_hil/event'
 CYCLE_TYPE, SIGNALS_TYPE = 'abs_hil/msg/Cycle', 'abs_hil/msg/Signals'
 #: kinds of events and their levels in a log
 LEVELS = {'phase': 20, 'command': 20, 'limit': 30, 'fault': 40}
 MEDIA_TYPES = {'.json': 'application/json', '.toml': 'application/toml', '.csv': 'text/csv'}
 #: ROS 2's stamps hold no later time
 LAST_NS = (2 ** 31 - 1) * 10 ** 9
-#: a run's messages count from 0, and none makes more
-LAST_NUMBER = 10 ** 13
 #: files of a run folder that go with its rows
 ATTACHED = ('config.toml', 'experiment.toml', 'summary.json', 'environment.json', 'events.csv')
-
-
-@dataclasses.dataclass
-class Event:
-    time_s: float
-    kind: str
-    text: str
 
 
 @dataclasses.dataclass
@@ -85,21 +73,20 @@ def comment(name: str) -> str:
 
 
 def read(path: str) -> Source:
-    """Reads a run folder, an event log or a CSV. Raises ValueError, which names the file, for anything else."""
-    place = pathlib.Path(path)
-    run = load(place)
+    """Reads what abs_hil.load does. Raises ValueError, which names the file, for anything else."""
+    run = load(path)
     missing = [name for name in COLUMNS if name not in run.columns]
     if missing:
         raise ValueError(f'"{path}" has no column {missing[0]}: an older version wrote it. Convert its event log')
-    source = Source(run, 0, [], {}, _missing_rows(run))
-    source.losses.extend(note for note in run.notes
-                         if not note.startswith(('an event log has no', 'no run.csv', 'no summary.json')))
-    if place.is_dir():
-        _read_folder(place, source)
-    log = place / 'run.lcmlog' if place.is_dir() else place
-    if log.suffix == '.lcmlog' and (not place.is_dir() or not (place / 'run.csv').exists()):
-        _read_log_facts(log, source)
-    if run.summary.get('config') and 'config.toml' not in source.attachments:
+    source = Source(run, run.start_ns, run.events, run.attachments, list(dict.fromkeys([*missing_rows(run), *run.losses])))
+    source.losses += [note for note in run.notes if not note.startswith(('no run.csv', 'no summary.json'))]
+    if pathlib.Path(path).is_dir():
+        _read_folder(pathlib.Path(path), source)
+    if run.events and 'events.csv' not in source.attachments:
+        fields = {'time_s': float, **dict.fromkeys(('event', 'phase', 'reason', 'value', 'name'), object)}
+        source.attachments['events.csv'] = csv_bytes({one: np.array([getattr(event, one) for event in run.events], dtype=kind)
+                                                      for one, kind in fields.items()})
+    if run.summary.get('config') and not {'config.toml', 'config.json'} & {*source.attachments}:
         source.attachments['config.json'] = json.dumps(run.summary['config'], indent=2).encode()
     for figure in ('telemetry_drops', 'csv_rows_lost'):
         if run.summary.get(figure):
@@ -111,7 +98,7 @@ def read(path: str) -> Source:
     return source
 
 
-def _missing_rows(run: Run) -> list[str]:
+def missing_rows(run: Run) -> list[str]:
     """Rows that the times say are missing. A decimated recording has longer steps throughout."""
     steps = np.diff(run['time_s'])
     if len(steps) == 0:
@@ -133,42 +120,8 @@ def _read_folder(folder: pathlib.Path, source: Source) -> None:
     except (ValueError, AttributeError):
         source.losses.append('environment.json cannot be read: the times begin at 1970-01-01')
     if 'events.csv' in source.attachments:
-        events = [Event(one.time_s, one.event, f'{one.name or one.phase}: {one.reason}')
-                  for one in read_events(folder / 'events.csv')]
-        _add_events(source, events, lambda number: f'{folder / "events.csv"}:{number + 2}')
-
-
-def _add_events(source: Source, events: list[Event], place: Callable[[int], str]) -> None:
-    check_times(np.array([event.time_s for event in events]), place, rising=False)
-    source.events.extend(events)
-
-
-def _read_log_facts(path: pathlib.Path, source: Source) -> None:
-    facts: dict[str, Any] = _core.read_log_facts(str(path))
-    for name in ('cycles', 'sequences', 'event_sequences'):
-        for number in facts[name][~((facts[name] >= 0) & (facts[name] <= LAST_NUMBER))][:1].tolist():
-            raise ValueError(f'{path}: a message has the impossible number {number} among its {name}')
-    source.start_ns = max(facts['start_us'], 0) * 1000
-    if lost := _gaps(facts['sequences'], 1):
-        source.losses.append(f'{lost} messages of telemetry are missing in the log')
-    if events_lost := _gaps(facts['event_sequences'], 1):
-        source.losses.append(f'{events_lost} events are missing in the log')
-    cycles = np.diff(facts['cycles'])
-    if len(cycles):
-        every = int(np.median(cycles))
-        dropped = _gaps(facts['cycles'], every) - lost
-        if dropped > 0:
-            source.losses.append(f'{dropped} cycles have no message, although every {every} of them should have one')
-    events = [Event(time_s, kind.decode(errors='replace'),
-                    message.decode(errors='replace') or str(REASONS.get(reason, {}).get('text', reason)))
-              for time_s, kind, reason, message in facts['events']]
-    _add_events(source, events, lambda number: f'{path}: event {number + 1}')
-
-
-def _gaps(numbers: np.ndarray, step: int) -> int:
-    """How many numbers are missing in a sequence that should rise by `step`."""
-    steps = np.diff(numbers) // max(step, 1)
-    return int(np.sum(np.maximum(steps - 1, 0)))
+        source.events = read_events(source.attachments['events.csv'], folder / 'events.csv')
+        check_times(np.array([event.time_s for event in source.events]), lambda row: f'{folder / "events.csv"}:{row + 2}', False)
 
 
 def to_mcap(source: Source, name: str) -> None:
@@ -180,7 +133,7 @@ def to_mcap(source: Source, name: str) -> None:
             if names:
                 mcap.add_struct(topic, type_name, [(field, comment(field)) for field in names])
         for event in source.events:
-            mcap.log(EVENT_TOPIC, source.start_ns + round(event.time_s * 1e9), LEVELS.get(event.kind, 20), event.kind,
+            mcap.log(EVENT_TOPIC, source.start_ns + round(event.time_s * 1e9), LEVELS.get(event.event, 20), event.event,
                      event.text)
         mcap.write_rows(CYCLE_TOPIC, times_ns, list(columns.values()))
         if signals:

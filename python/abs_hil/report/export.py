@@ -1,5 +1,4 @@
 """The rows of runs in other formats: CSV, JSON, MAT-files, Parquet."""
-import importlib
 import json
 import math
 import re
@@ -8,8 +7,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..places import Unavailable, how_to_install
-from ..rows import TEXTS, read_rows
+from ..rows import TEXTS
 from ..run import csv_bytes
 from .files import RunFiles
 
@@ -23,7 +21,7 @@ class Exporter:
         self.runs = runs
         self.notes: list[str] = []
         self._chosen = columns
-        self._columns = columns or list(dict.fromkeys(name for run in runs for name in read_rows(run.csv).columns))
+        self._columns = columns or list(dict.fromkeys(name for run in runs for name in run.rows().columns))
 
     def write(self, kind: str, out: BinaryIO) -> None:
         {'csv': self._csv, 'json': self._json, 'octave': self._octave, 'parquet': self._parquet}[kind](out)
@@ -31,12 +29,12 @@ class Exporter:
     def _tables(self) -> Iterator[tuple[RunFiles, dict[str, np.ndarray]]]:
         """Each run with those of the columns that it has; phases as an array of names."""
         for run in self.runs:
-            rows = read_rows(run.csv)
+            rows = run.rows()
             for name in self._chosen:
                 if name not in rows.columns:
-                    raise ValueError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.columns)}')
+                    raise ValueError(f'{run.source}: no column "{name}"; the file has the columns {", ".join(rows.columns)}')
             if rows.truncated:
-                self.notes.append(f'{run.csv}: the last row is incomplete, as after a crash, and is left out')
+                self.notes.append(f'{run.source}: the last row is incomplete, as after a crash, and is left out')
             yield run, {name: rows.columns[name] for name in self._chosen or rows.columns}
 
     def _csv(self, out: BinaryIO) -> None:
@@ -76,21 +74,9 @@ class Exporter:
 
     def _parquet(self, out: BinaryIO) -> None:
         import pandas
+        import pyarrow  # noqa: F401  # pandas says only that no engine is usable
         frames = [pandas.DataFrame({'run': run.name, **columns}) for run, columns in self._tables()]
-        try:
-            pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
-        except ImportError:
-            # pandas says only that no engine is usable. pyarrow itself says why, for instance that NumPy is too old.
-            raise Unavailable(f'Parquet files need the Python package pyarrow ({_why_not("pyarrow")}); install it: '
-                              f'{how_to_install("pyarrow")}') from None
-
-
-def _why_not(package: str) -> str:
-    try:
-        importlib.import_module(package)
-    except ImportError as error:
-        return str(error)
-    return 'pandas cannot use it'
+        pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
 
 
 def _without_nan(values: np.ndarray) -> list[Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..rows import Rows, read_rows
+from ..rows import Rows
 from .files import RunFiles
 from .model import Bar, Curve, Figure, Label, Mark, Panel, Shade, Style, axis_around, phase_colour, run_style, thinned
 from .survey import JUDGED_M_S, Survey, survey
@@ -344,7 +344,7 @@ def run_figures(runs: list[RunFiles], options: Options,
     shown = False
     stretches = min(max(STRETCHES_OF_ALL_RUNS // max(len(runs), 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
     for number, run in enumerate(runs, 1):
-        rows = read_rows(run.csv)
+        rows = run.rows()
         found = survey(run, rows)
         surveys.append(found)
         windows.append(window_of(found, options.choice, found.brakes))
@@ -360,5 +360,5 @@ def run_figures(runs: list[RunFiles], options: Options,
         for number, found in enumerate(surveys):
             if found.brakes:
                 windows[number] = window_of(found, options.choice, False)
-                profiles[number] = profiles_of(read_rows(runs[number].csv), found, windows[number], stretches)
+                profiles[number] = profiles_of(runs[number].rows(), found, windows[number], stretches)
     return surveys, FigureMaker(runs, surveys, windows, profiles, options, braking).figures()

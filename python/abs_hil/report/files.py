@@ -1,6 +1,4 @@
 """The files of runs, except their rows: what the command line names, and the files beside each CSV."""
-import csv
-import io
 import json
 import math
 import os
@@ -13,8 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
+from ..figures import number_in
 from ..nesting import parse_toml
-from ..run import flattened, names_apart, read_object, read_text, runs_in_series
+from ..recording import CSV, kind_of, load, named, read_events, rows_of, run_names, runs_in_series
+from ..rows import Rows
+from ..run import Event, flattened, names_apart, read_object, read_text
 from .text import DASH, clean, number_text
 
 NAME_CHARACTERS = 40
@@ -22,22 +23,6 @@ MOST_DIFFERENCES = 3
 #: largest accepted bin of a histogram, 10 s
 MOST_US = 10_000_000
 PARTS = ('wake-up latency', 'read', 'control', 'write', 'whole cycle')
-
-
-@dataclass
-class Event:
-    """A line of a run folder's events.csv."""
-    time_s: float
-    event: str
-    phase: str
-    reason: str = ''
-    value: str = ''
-    name: str = ''  # the experiment's own name of the phase; empty in files of older versions
-
-    @property
-    def unusual(self) -> bool:
-        """True for an event that is neither a change of phase nor the regular end."""
-        return self.event != 'phase' and not (self.event == 'limit' and self.phase == 'stopped')
 
 
 @dataclass
@@ -50,7 +35,7 @@ class Histogram:
 @dataclass
 class RunFiles:
     """All files of a run but its rows. All but the CSV may be missing; `notes` say what is missing."""
-    csv: pathlib.Path
+    source: str | os.PathLike[str]  # of its rows: a file, or FILE#N
     name: str
     label: str = ''    # in legends and table heads: the given one, else in what it differs from the others
     called: str = ''   # in notes and files: the given label, else the name
@@ -73,10 +58,11 @@ class RunFiles:
         return clean(value) if isinstance(value, str) else ''
 
     def config_number(self, key: str, otherwise: float) -> float:
-        try:
-            return float(self.config[key])
-        except (KeyError, ValueError):
-            return otherwise
+        return number_in(self.config, key, otherwise)
+
+    def rows(self) -> Rows:
+        """Read anew each time: the rows of many runs do not fill the memory."""
+        return rows_of(self.source)
 
 
 @dataclass
@@ -100,28 +86,6 @@ def read_toml(path: pathlib.Path) -> dict[str, str]:
     except ValueError as error:
         line = re.search(r'at line (\d+)', str(error))
         raise ValueError(f'{path}{":" + line[1] if line else ""}: {clean(error)}') from None
-
-
-def read_events(path: pathlib.Path) -> list[Event]:
-    text = read_text(path)
-    if not text.startswith('time_s,event,phase,reason,value'):
-        raise ValueError(f'{path}:1: the header must begin with "time_s,event,phase,reason,value"')
-    lines = text.split('\n')
-    events = []
-    for number, line in enumerate(lines[1:], 2):
-        last = number == len(lines)  # a line without line end is the trace of a crash
-        if last and not line:
-            break
-        fields: list[str] = next(csv.reader(io.StringIO(line)), [])
-        try:
-            time_s = float(fields[0])
-            events.append(Event(time_s, clean(fields[1], 40), clean(fields[2], 40), clean(fields[3], 1000),
-                                clean(fields[4].rstrip('\r'), 40), clean(''.join(fields[5:6]).rstrip('\r'), 40)))
-        except (IndexError, ValueError):
-            if last:
-                break
-            raise ValueError(f'{path}:{number}: not an event: "{clean(line, 60)}"') from None
-    return events
 
 
 def read_histogram(path: pathlib.Path) -> Histogram:
@@ -169,7 +133,8 @@ def _read_folder(run: RunFiles, folder: pathlib.Path) -> None:
     else:
         run.config = there('config.toml', 'the configuration is unknown', read_toml) or {}
     run.environment = texts_of(there('environment.json', 'kernel, build and board are unknown', read_object) or {})
-    run.events = there('events.csv', 'events are the phase changes in the CSV, without reasons', read_events) or []
+    run.events = there('events.csv', 'events are the phase changes in the CSV, without reasons', 
+                       lambda path: read_events(path.read_bytes(), path)) or []
     if run.summary.get('virtual_time') is not True:
         run.histogram = there('histogram.txt', "no histograms of the cycle's timing", read_histogram)
 
@@ -183,22 +148,28 @@ def _base_name(path: pathlib.Path) -> str:
 def _load_run(path: pathlib.Path) -> RunFiles:
     if path.is_dir():
         _core.check_seal(os.fsencode(path))
-        run = RunFiles(path / 'run.csv', _base_name(path))
+        run = RunFiles(path / ('run.csv' if (path / 'run.csv').exists() else 'run.lcmlog'), _base_name(path))
         _read_folder(run, path)
+        if not (path / 'run.csv').exists():
+            run.notes.append('no run.csv: the rows are those of run.lcmlog')
         return run
-    return RunFiles(path, _base_name(path), notes=[
-        'only a CSV file: configuration, reasons and timing are unknown; metrics are computed from it with the paper\'s '
-        'radius and end speed'])
+    if kind_of(named(path)[0]) == CSV:
+        return RunFiles(path, _base_name(path), notes=[
+            'only a CSV file: configuration, reasons and timing are unknown; metrics are computed from it with the paper\'s '
+            'radius and end speed'])
+    run = load(path)
+    return RunFiles(path, clean(run.name, NAME_CHARACTERS), summary=run.summary, config=texts_of(run.config), events=run.events,
+                    notes=[*run.notes, *run.losses])
 
 
 def find_runs(arguments: Iterable[str | pathlib.Path], labels: Sequence[str] = ()) -> FoundRuns:
-    """The runs that the command line names: CSV files, run folders, series folders. Raises ValueError."""
+    """The runs that the command line names: files of runs (of several in one file all), run folders, series folders. Raises ValueError."""
     found = FoundRuns()
     for argument in arguments:
         path = pathlib.Path(argument)
-        if not path.exists():
-            raise ValueError(f'"{path}" does not exist; give a run folder, a run\'s CSV file or a series folder')
-        if not path.is_dir() or (path / 'run.csv').exists():
+        if not path.is_dir():
+            found.runs += [_load_run(pathlib.Path(name)) for name in run_names(path)]
+        elif (path / 'run.csv').exists() or (path / 'run.lcmlog').exists():
             found.runs.append(_load_run(path))
         elif (path / 'series.json').exists() or any(path.glob('run-*/')):
             folders, notes = runs_in_series(path)

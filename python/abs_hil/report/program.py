@@ -168,10 +168,8 @@ def _report(o: argparse.Namespace) -> None:
     else:
         write_text(path, page(**parts))
     _say(parts['notes'])
-    if not o.table:
-        print(path)
-    if o.merits:
-        print(o.merits)
+    for made in [str(path)] * (not o.table) + [o.merits] * bool(o.merits):
+        print(made, file=sys.stderr if '-' in (str(path), o.merits) else sys.stdout)  # "-" is stdout
     if o.figures:
         print(*pictures.write(figures, pathlib.Path(o.figures), o.format or 'svg', o.force), sep='\n')
 

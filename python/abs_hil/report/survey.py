@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import _core
-from ..figures import FigureOfMerit, figures
+from ..figures import PAPER_R2_M, FigureOfMerit, figures, figures_of, r2_m
 from ..rows import TEXTS, Rows
 from ..run import signals_of
 from .files import RunFiles
@@ -13,8 +13,6 @@ from .text import significant
 
 #: car speed above which slip and its estimates are judged
 JUDGED_M_S = 3.0
-PAPER_R2_M = 0.099
-DEFAULT_END_SPEED_M_S = 0.3
 #: a run has a handful
 MOST_PHASES = 2000
 MOST_BRAKINGS = 60
@@ -22,8 +20,6 @@ MOST_BRAKINGS = 60
 RELEASED_S = 0.2
 #: a wanted slip that stands, changes by this much in a cycle and stands again begins a pulse; laws that seek theirs drift
 SLIP_STEP = 0.01
-_METRIC_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est',
-                   'slip_ref', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
 _PROFILES = ('friction', 'brake_torque', 'motor_torque', 'upper_bearing', 'lower_bearing')
 
 
@@ -76,7 +72,7 @@ class Survey:
 def survey(run: RunFiles, rows: Rows) -> Survey:
     time = rows.time_s
     found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
-    found.r2_m = run.config_number('plant.r2_m', run.config_number('model.r2_m', PAPER_R2_M))
+    found.r2_m = r2_m(run.config)
     braking = rows.braking
     kinds = rows.columns['phase']
     names = rows.columns.get('phase_name', kinds)
@@ -92,21 +88,15 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         found.brake_from_s = float(time[places[0]])
         found.brake_to_s = float(time[min(places[-1] + 1, len(time) - 1)])
     found.known = {name for name in rows.columns if name in TEXTS or not np.isnan(rows.columns[name]).all()}
-    found.signals = [name for name in signals_of(list(rows.columns)) if name in found.known]
-    end_speed_m_s = run.config_number('experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S)
-
-    def figures_from(first: int, last: int) -> dict[str, float]:
-        columns = {name: rows.columns[name][first:last] for name in _METRIC_COLUMNS}
-        columns['distance_m'] = columns['distance_m'] - (columns['distance_m'][0] if first else 0.0)
-        return _core.metrics_of({**columns, 'braking': braking[first:last].astype(np.float64)}, found.r2_m, end_speed_m_s)
-    found.metrics = figures_from(0, len(time))
+    found.signals = [name for name in signals_of(rows.columns) if name in found.known]
+    found.metrics = figures_of(rows.columns, run.config)
     brakings = [(int(place), pulse) for start, end in zip(starts.tolist(), [*starts[1:].tolist(), len(time)]) if braking[start]
                 for pulse, place in enumerate([start, *_pulses(rows, start, end)], 1)][:MOST_BRAKINGS]
     if len(brakings) > 1:
         ends = [place for place, _ in brakings[1:]] + [len(time)]
         for number, ((first, pulse), last) in enumerate(zip(brakings, ends), 1):
             name = next(phase.shown for phase in reversed(found.phases) if phase.from_s <= time[first])
-            found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}', figures_from(first, last)))
+            found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}', figures_of(rows.columns, run.config, first, last)))
     found.changes = _changes(run, rows, found.r2_m)
     return found
 

@@ -6,7 +6,8 @@ from typing import Self
 
 import pandas
 
-from .files import Event, RunFiles, differing_keys
+from ..run import Event
+from .files import RunFiles, differing_keys
 from .survey import Survey, contradictions, merits_shown, value_of
 from .text import DASH, shown, significant
 

@@ -1,8 +1,8 @@
 """From LCM's packets, live or of a log, to the history and the facts of runs."""
 import math
+import os
 import pathlib
 import re
-import struct
 import time
 from collections.abc import Callable, Iterator
 from operator import attrgetter
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..core import _core, load_network
-from ..messages import MOST_SIGNALS, PHASES, decode
+from ..messages import MOST_SIGNALS, PHASES, decode, is_ours, messages_of
+from ..recording import LOG, kind_of, load, named
 from .runs import COLUMNS, DERIVED_PLACE, FIELDS, LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, PLACE, WIDTH, History, RunFacts
 
 Packet = tuple[str, bytes]
@@ -184,13 +185,14 @@ class Live:
 
 
 class Played:
-    """Packets of an event log, at the pace at which they were recorded, times `speed`; 0: at once."""
+    """Packets of a recording, at the pace at which they were recorded, times `speed`; 0: at once. Raises ValueError for what
+    is no recording, and for one of several rigs at once of which none is named."""
 
-    def __init__(self, path: pathlib.Path, speed: float) -> None:
-        self._events = log_events(path)
+    def __init__(self, name: str, speed: float) -> None:
+        self._events = recorded_packets(name)
         self._next = next(self._events, None)
         if self._next is None:
-            raise ValueError(f'"{path}" holds no message of LCM; give an event log (.lcmlog) that abs_hil or lcm-logger wrote')
+            raise ValueError(f'"{name}" holds no message of abs_hil; `abs_hil log info {name}` lists what it holds')
         self._speed = speed
         self._first_us = self._next[0]
         self._began = time.monotonic()
@@ -204,13 +206,28 @@ class Played:
         return found
 
 
-def log_events(path: pathlib.Path) -> Iterator[tuple[int, str, bytes]]:
-    """(time in us, channel, data) of an event log, up to the first place that is damaged."""
-    with open(path, 'rb') as file:
-        while len(head := file.read(28)) == 28:
-            sync, _, stamp_us, channel_bytes, data_bytes = struct.unpack('>Iqqii', head)
-            if sync != 0xEDA1DA01 or not 0 < channel_bytes < 1000 or not 0 <= data_bytes < 1 << 24:
-                return
-            channel, data = file.read(channel_bytes), file.read(data_bytes)
-            if len(data) == data_bytes:
-                yield stamp_us, channel.decode(errors='replace'), data
+def recorded_packets(name: str) -> Iterator[tuple[int, str, bytes]]:
+    """(time in us, channel, data) of our messages in an event log, up to the first place that is damaged; of another
+    recording those that its rows and events make."""
+    place, number = named(name)
+    place = place / 'run.lcmlog' if (place / 'run.lcmlog').is_file() else place
+    if kind_of(place) != LOG:
+        yield from messages_of(load(name))
+        return
+    runs = {(run, channel) for run, *_, channel, _ in _events(place) if channel.endswith('TELEMETRY')}
+    if number or len({channel for _, channel in runs}) > 1:
+        number = _core.chosen_run(os.fsencode(name), len(runs)) + 1
+    for run, _, _, time_us, channel, data in _events(place):
+        if number in (0, run + 1) and is_ours(data):
+            yield time_us, channel, data
+
+
+def _events(place: pathlib.Path) -> Iterator[Any]:
+    """Those of a log up to the first place that is damaged. Raises ValueError if there is none before."""
+    event = None
+    try:
+        for event in _core.LogEvents(os.fsencode(place)):
+            yield event
+    except ValueError:
+        if event is None:
+            raise

@@ -1,6 +1,5 @@
 """The command line of abs_serve; `abs_hil serve` starts it."""
 import asyncio
-import pathlib
 import secrets
 import signal
 from typing import Any
@@ -43,11 +42,7 @@ def _source(given: Any) -> Live | Played:
         raise ValueError(f'--speed {given.speed:g}: give a number in [0, 1000]')
     if given.foxglove is not None and given.speed == 0:
         raise ValueError('--foxglove shows what comes while it is looked at: give --speed above 0')
-    place = pathlib.Path(given.log)
-    place = place / 'run.lcmlog' if place.is_dir() else place
-    if not place.is_file():
-        raise ValueError(f'"{place}" is no event log: give a .lcmlog (abs_hil --log FILE), or a run folder that has one')
-    return Played(place, given.speed)
+    return Played(given.log, given.speed)
 
 
 def _sender(given: Any) -> Command:
@@ -65,7 +60,7 @@ def _sender(given: Any) -> Command:
 
 async def _serve(given: Any, source: Live | Played) -> int:
     """Serves until a signal comes; its number."""
-    feed = Feed(History(), given.prefix)
+    feed = Feed(History(), given.prefix if given.log is None else '')
     # Another user of this computer could connect to its own address too, so commands always need the token.
     token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
     shown = given.log or given.lcm_url or 'LCM'

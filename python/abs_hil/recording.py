@@ -1,0 +1,348 @@
+"""Recorded runs: which kind of file holds them, told by its content, and the one reader of each kind.
+
+A file may hold several runs: FILE#2 names the second one.
+"""
+from __future__ import annotations
+
+import gzip
+import math
+import os
+import pathlib
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .core import _core
+from .figures import figures, figures_of
+from .interchange.mcap_file import mcap_file
+from .messages import PHASES, REASONS, decode
+from .nesting import parse_json
+from .options import PathLike
+from .rows import CONTRACT, TEXTS, Rows, check_times, in_order, read_rows, starts_of
+from .run import Event, Run, Series, name_phases, read_object, signals_of
+
+FOLDER, LOG, CSV, MCAP, PARQUET = 'run folder', 'LCM event log', 'CSV file', 'MCAP file', 'Parquet file'
+WHAT = "a run folder, an event log (.lcmlog), a run's CSV, an MCAP or a Parquet file of abs_hil convert"
+#: how files begin
+_BEGINNINGS = {b'\xed\xa1\xda\x01': LOG, b'\x89MCAP0\r\n': MCAP, b'PAR1': PARQUET}
+_FOREIGN = {b'PK\x03\x04': 'a ZIP archive, as the own files of spreadsheets are: save the table as CSV',
+            b'\x28\xb5\x2f\xfd': 'compressed: decompress it first (unzstd)', b'\xfd7zXZ': 'compressed: decompress it first (unxz)'}
+#: columns of a converted log that say where a row came from
+FROM_LOG = ('log_event', 'log_time_us', 'channel', 'type')
+#: a run's messages count from 0, and none makes more
+_LAST_NUMBER = 10 ** 13
+
+
+def named(path: PathLike) -> tuple[pathlib.Path, int]:
+    """The file, and the number of the run in it that a name like FILE#2 asks for; 0: the only one."""
+    place, number = _core.named_recording(os.fsencode(path))
+    return pathlib.Path(os.fsdecode(place)), number
+
+
+def _choose(path: PathLike, runs: int) -> int:
+    """Which of so many runs the name asks for, from 0. Raises ValueError, with what to give, if it must say it."""
+    return int(_core.chosen_run(os.fsencode(path), runs))
+
+
+def kind_of(place: pathlib.Path) -> str:
+    """FOLDER, LOG, CSV, MCAP or PARQUET. Raises ValueError, with the reason and what to do, for anything else."""
+    if place.is_dir():
+        return FOLDER
+    try:
+        if place.exists() and not place.is_file():
+            return CSV  # a pipe can be read once only
+        with open(place, 'rb') as file:
+            head = file.read(512)
+    except OSError as error:
+        raise ValueError(f'cannot read "{place}": {error.strerror}; give {WHAT}') from None
+    if not head:
+        raise ValueError(f'{place}: the file is empty: nothing was recorded')
+    for begin, what in {**_BEGINNINGS, **_FOREIGN}.items():
+        if head.startswith(begin):
+            if begin in _BEGINNINGS:
+                return what
+            raise ValueError(f'"{place}" is {what}')
+    if head[:2] == b'\x1f\x8b':
+        with open(place, 'rb') as packed:
+            head = _first_bytes(packed)
+        if head.startswith(tuple(_BEGINNINGS)):
+            raise ValueError(f'"{place}" is compressed: decompress it first (gunzip)')
+    elif place.suffix in ('.lcmlog', '.mcap', '.parquet') or (b'\0' in head and head[:2] not in (b'\xff\xfe', b'\xfe\xff')):
+        raise ValueError(f'"{place}" is no recording, although its name may say so; give {WHAT}')
+    return CSV
+
+
+def _first_bytes(packed: Any) -> bytes:
+    try:
+        return gzip.GzipFile(fileobj=packed).read(8)
+    except (OSError, EOFError):
+        return b''
+
+
+def load(path: PathLike) -> Run:
+    """Loads a run folder, an event log (.lcmlog), a run's CSV, or what `abs_hil convert` made of one: MCAP, Parquet, CSV;
+    whole or cut off. `Run.notes` says what is missing. FILE#2 is the second run of a file that holds several.
+
+    Raises ValueError for anything else, with the file, the place and the reason; so it does for a file with several runs of
+    which none is named, and for a run folder whose files are no longer those of its SHA256SUMS. Raises ImportError, with
+    the command that mends it, where the package for MCAP (mcap) or Parquet (pyarrow) is missing.
+    """
+    place, number = named(path)
+    kind = kind_of(place)
+    if kind != FOLDER:
+        run = {LOG: _load_log, CSV: _load_csv, MCAP: _load_mcap, PARQUET: _load_parquet}[kind](place, os.fspath(path))
+        run.folder, run.name = place.parent, f'{place.stem}#{number}' if number else place.stem
+        return run
+    _choose(path, 1)
+    _core.check_seal(os.fsencode(place))
+    rows = next((place / one for one in ('run.csv', 'run.lcmlog') if (place / one).exists()), None)
+    if rows is None:
+        what = 'a series; load it with abs_hil.load_series' if (place / 'series.json').exists() else 'no run folder'
+        raise ValueError(f'"{place}" is {what} (it has no run.csv)')
+    run = load(rows)
+    run.folder, run.name = place, place.resolve().name
+    if rows.suffix == '.lcmlog':
+        run.notes.append('no run.csv: the rows are those of run.lcmlog')
+    elif (place / 'summary.json').exists():
+        try:
+            run.summary = read_object(place / 'summary.json')
+        except ValueError as error:
+            run.notes.append(f'summary.json is not used: {error}')
+    else:
+        run.notes.append('no summary.json: names, figures and configuration are unknown')
+    return run
+
+
+def rows_of(path: PathLike) -> Rows:
+    """The rows alone of what `load` takes."""
+    run = load(path)
+    return Rows(run.columns, run.truncated)
+
+
+def run_names(path: PathLike) -> list[str]:
+    """The names of all runs of a file, as FILE#1; FILE alone if it holds one. ValueError as `load`."""
+    place, number = named(path)
+    kind = kind_of(place)
+    if number or not place.is_file():
+        return [os.fspath(path)]
+    if kind == LOG:
+        count = _core.read_log(os.fsencode(place), 0, False)['runs']
+    else:
+        table = {MCAP: lambda: mcap_file(place).columns(), PARQUET: lambda: _parquet(place)[0],
+                 CSV: lambda: read_rows(place, (), ('run',)).columns}
+        count = len(starts_of(table[kind]()))
+    return [os.fspath(path)] if count <= 1 else [f'{place}#{one}' for one in range(1, count + 1)]
+
+
+def load_series(folder: PathLike) -> Series:
+    """Loads the complete runs of a series' folder, in order; `Series.notes` names those that are left out."""
+    place = pathlib.Path(folder)
+    folders, notes = runs_in_series(place)
+    runs = [load(path) for path in folders]
+    try:
+        index = read_object(place / 'series.json')
+    except ValueError:
+        index = {}
+        notes.append('no readable series.json')
+    return Series(runs, index, notes)
+
+
+def runs_in_series(place: pathlib.Path) -> tuple[list[pathlib.Path], list[str]]:
+    """The folders of the complete runs of a series, in order, and notes about the others. Raises ValueError if there is
+    none."""
+    try:
+        folders = sorted(path for path in place.iterdir() if path.name.startswith('run-') and path.is_dir())
+    except (FileNotFoundError, NotADirectoryError):
+        folders = []
+    except OSError as error:
+        raise ValueError(f'cannot read "{place}": {error.strerror}') from None
+    if not folders:
+        raise ValueError(f'"{place}" is no series folder (it has no run-0001/)')
+    complete = [path for path in folders if (path / 'run.csv').exists() and (path / 'summary.json').exists()]
+    notes = [f'{path} is not complete and is left out' for path in folders if path not in complete]
+    if not complete:
+        raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
+    return complete, notes
+
+
+def read_events(data: bytes, place: PathLike) -> list[Event]:
+    """The events of an events.csv. ValueError, with `place` and line, for what is none."""
+    text = in_order(data[:data.rfind(b'\n') + 1])  # a line without line end is the trace of a crash
+    head, *lines = (line.split(text.separator) for line in text.data.decode('utf-8', 'replace').split('\n'))
+    if head[:5] != ['time_s', 'event', 'phase', 'reason', 'value']:
+        raise ValueError(f'{place}:1: the header must begin with "time_s,event,phase,reason,value"')
+    events = []
+    for number, fields in zip(text.lines[1:], lines):
+        try:
+            shown = [_core.clean_text(one.encode(), most) for one, most in zip(fields[1:], (40, 40, 1000, 40, 40))]
+            events.append(Event(float(fields[0]), *shown[:3], shown[3], ''.join(shown[4:])))
+        except (IndexError, TypeError, ValueError):
+            shown = _core.clean_text(','.join(fields).encode(), 60)
+            raise ValueError(f'{place}:{number}: not an event: "{shown}"') from None
+    return events
+
+
+# ---- the readers: each takes the place of the file, and the name by which it was asked for
+
+def _load_csv(place: pathlib.Path, name: str) -> Run:
+    rows = read_rows(place)
+    notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if rows.truncated else []
+    columns, _ = _one_run({one: values for one, values in rows.columns.items() if one not in FROM_LOG}, name)
+    run = Run(columns, {}, signals_of(columns), notes=notes + rows.notes)
+    run.truncated = rows.truncated
+    return run
+
+
+def read_log(path: PathLike, whole: bool = False) -> dict[str, Any]:
+    """_core.read_log of the run that the name asks for, with phases as names."""
+    place, number = named(path)
+    found: dict[str, Any] = _core.read_log(os.fsencode(place), max(number, 1) - 1, whole)
+    _choose(path, found['runs'])
+    name_phases(found['columns'])
+    return found
+
+
+def _load_log(place: pathlib.Path, name: str) -> Run:
+    found = read_log(name)
+    messages: dict[str, list[Any]] = {'event_t': [], 'experiment_t': [], 'status_t': []}
+    for data in found['messages']:
+        try:
+            message = decode(data)
+            messages.setdefault(type(message).__name__, []).append(message)
+        except ValueError:
+            found['unreadable'] += 1
+    if found['rows'] == 0:
+        raise ValueError(found['damage'] or f'"{place}" holds no telemetry of abs_hil' + (
+            ', or another version of abs_hil recorded it' if found['unreadable'] else '')
+            + f'; `abs_hil log info {place}` lists what it holds')
+    run = Run(found['columns'], {}, tuple(found['signals']))
+    run.notes = [note for told, note in (
+        (found['damage'], f'parts of the log are not used: {found["damage"]}'),
+        (found['lacks'], f'{found["lacks"]}: another version of abs_hil recorded it'),
+        (found['unreadable'], f'{found["unreadable"]} messages of the log cannot be read and are left out'),
+        (found['late'], f'{found["late"]} messages of telemetry came twice or late and are left out')) if told]
+    check_times(run['time_s'], lambda row: f'{place}: message {row + 1} of its telemetry')
+    run.start_ns = max(found['start_us'], 0) * 1000
+    run.losses = _losses(place, found, messages['event_t'])
+    names = run.columns.get('phase_name', run['phase'])
+    for event in messages['event_t']:
+        row = min(int(np.searchsorted(run['time_s'], event.time_s - 1e-6)), len(run) - 1)
+        phase = PHASES[event.phase] if 0 <= event.phase < len(PHASES) else 'fault'
+        run.events.append(Event(event.time_s, event.kind, phase, event.reason_text, f'{event.value:.12g}', str(names[row]),
+                                event.message))
+    check_times(np.array([event.time_s for event in run.events]), lambda row: f'{place}: event {row + 1}', rising=False)
+    for told in messages['experiment_t'][:1]:
+        run.summary = {one: getattr(told, one) for one in ('experiment', 'controller', 'plant', 'backend', 'version')}
+        try:
+            run.summary['config'] = parse_json(told.config_json)
+        except ValueError:
+            run.notes.append('the configuration in the log is not valid JSON')
+    ends = {'fault': 'fault', 'stop request': 'stopped'}
+    for event in reversed(messages['event_t']):
+        reason = REASONS.get(event.reason, {'kind': '', 'name': ''})
+        result = 'completed' if reason['name'] == 'sequence_complete' else ends.get(reason['kind'])
+        if result is not None:
+            run.summary.update(result=result, reason=event.reason_text)
+            for counted in messages['status_t'][-1:]:
+                run.summary.update((one, getattr(counted, one)) for one in ('cycles', 'overruns', 'telemetry_drops', 'publish_failures'))
+            return _with_figures(run)
+    run.notes.append('the log ends before the run did: its result is unknown')
+    return _with_figures(run)
+
+
+def _losses(place: pathlib.Path, found: Mapping[str, Any], events: list[Any]) -> list[str]:
+    sequences, cycles = found['sequences'], found['cycles']
+    event_sequences = np.array([event.sequence for event in events], dtype=np.int64)
+    for what, values in (('cycles', cycles), ('sequences', sequences), ('event_sequences', event_sequences)):
+        for number in values[~((values >= 0) & (values <= _LAST_NUMBER))][:1].tolist():
+            raise ValueError(f'{place}: a message has the impossible number {number} among its {what}')
+    every = int(np.median(np.diff(cycles))) if len(cycles) > 1 else 1
+    lost, events_lost = missing_in(sequences), missing_in(event_sequences)
+    dropped = missing_in(cycles, every) - lost
+    return [text for count, text in (
+        (lost, f'{lost} messages of telemetry are missing in the log'), (events_lost, f'{events_lost} events are missing in the log'),
+        (dropped, f'{dropped} cycles have no message, although every {every} of them should have one')) if count > 0]
+
+
+def missing_in(numbers: np.ndarray, step: int = 1) -> int:
+    """How many numbers are missing in a sequence that should rise by `step`."""
+    return int(np.sum(np.maximum(np.diff(numbers) // max(step, 1) - 1, 0)))
+
+
+def _load_mcap(place: pathlib.Path, name: str) -> Run:
+    file = mcap_file(place)
+    columns, (first, last) = _one_run(file.columns(), name)
+    run = _described(columns, file.metadata, file.attachments)
+    run.start_ns = max(int(file.times_ns[first]) - round(float(run['time_s'][0]) * 1e9), 0)
+    until_ns = file.times_ns[last] if last < len(file.times_ns) else math.inf
+    run.events = run.events or [Event((time_ns - run.start_ns) * 1e-9, kind, '', message=text)
+                                for time_ns, kind, text in file.events if run.start_ns <= time_ns < until_ns]
+    if file.damage:
+        run.notes.append(f'parts of "{place}" are not used: it is cut off or damaged ({file.damage})')
+    return run
+
+
+def _load_parquet(place: pathlib.Path, name: str) -> Run:
+    columns, metadata = _parquet(place)
+    return _described(_one_run(columns, name)[0], {one: data.decode(errors='replace') for one, data in metadata.items() if '.' not in one},
+                      {one: data for one, data in metadata.items() if '.' in one})
+
+
+def _parquet(place: pathlib.Path) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
+    """Columns, and our metadata. Columns that hold neither numbers nor texts of a run are left out."""
+    import pyarrow
+    import pyarrow.parquet
+    try:
+        table = pyarrow.parquet.read_table(place)
+    except (pyarrow.ArrowException, OSError) as error:
+        raise ValueError(f'"{place}" is cut off or damaged ({str(error).splitlines()[0]}); convert the run again') from None
+    columns, kinds = {}, pyarrow.types
+    for name, values in zip(table.column_names, table.columns):
+        if name in TEXTS:
+            columns[name] = np.array([one or '' for one in values.to_pylist()], dtype=object)
+        elif kinds.is_floating(values.type) or kinds.is_integer(values.type) or kinds.is_boolean(values.type):
+            columns[name] = np.array(values.cast(pyarrow.float64()).to_numpy(), dtype=float)
+    return columns, {key.decode().removeprefix('abs_hil.'): value for key, value in (table.schema.metadata or {}).items()
+                     if key.startswith(b'abs_hil.')}
+
+
+def _one_run(columns: Mapping[str, np.ndarray], name: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+    """The columns of the run that the name asks for, without their column `run`, and its rows [first, last)."""
+    if missing := [one for one in CONTRACT if one not in columns]:
+        raise ValueError(f'"{name}" lacks the columns {", ".join(missing)} of a run')
+    starts = [*starts_of(columns), len(columns['time_s'])]
+    if starts[-1] == 0:
+        raise ValueError(f'"{name}" holds no rows')
+    number = _choose(name, len(starts) - 1)
+    first, last = starts[number:number + 2]
+    chosen = {one: values[first:last] for one, values in columns.items() if one != 'run'}
+    check_times(chosen['time_s'], lambda row: f'{name}: row {first + row + 1}')
+    return chosen, (first, last)
+
+
+def _described(columns: dict[str, np.ndarray], metadata: Mapping[str, str], attachments: dict[str, bytes]) -> Run:
+    """A run of a converted file, with what stands there beside its rows."""
+    run = Run(columns, {one: metadata[one] for one in ('experiment', 'controller', 'plant', 'backend', 'result', 'reason')
+                        if one in metadata}, signals_of(columns))
+    run.attachments = attachments
+    run.losses = [one for one in re.split('; ', metadata.get('losses', 'none')) if one != 'none']
+    try:
+        if 'config.json' in attachments:
+            run.summary['config'] = parse_json(attachments['config.json'])
+        if 'events.csv' in attachments:
+            run.events = read_events(attachments['events.csv'], 'events.csv')
+        if 'summary.json' in attachments:
+            run.summary = dict(parse_json(attachments['summary.json']))
+            return run
+    except (TypeError, ValueError) as error:
+        run.notes.append(f'not all that was attached to the rows is used: {error}')
+    return _with_figures(run)
+
+
+def _with_figures(run: Run) -> Run:
+    """With the figures of merit of its rows, which no file holds."""
+    found = figures_of(run.columns, run.config)
+    run.summary.update((one, found[one] if math.isfinite(found[one]) else None) for one, row in figures().items() if row.in_summary)
+    return run
