@@ -50,9 +50,11 @@ def kind_of(place: pathlib.Path) -> str:
     """FOLDER, LOG, CSV, MCAP or PARQUET. Raises ValueError, with the reason and what to do, for anything else."""
     if place.is_dir():
         return FOLDER
+    if not place.exists():
+        raise ValueError(f'"{place}" does not exist; give {WHAT}')
+    if not place.is_file():
+        return CSV  # a pipe, which can be read once only
     try:
-        if place.exists() and not place.is_file():
-            return CSV  # a pipe can be read once only
         with open(place, 'rb') as file:
             head = file.read(512)
     except OSError as error:

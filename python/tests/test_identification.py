@@ -358,15 +358,15 @@ def test_pieces_leave_out_rest_and_changes_of_contact(logs):
     (lambda text: text.replace(',0.0,1.0,', ',nan,1.0,', 1), 'brake_pwm is nan in row 1; give a duty from 0 to 1'),
     (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0,\n', 1), 'wheels_apart is nan in row 1; give 0, or 1'),
     (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0,2\n', 1), 'wheels_apart is 2 in row 1; give 0, or 1'),
-    (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0\n', 1), 'row 1 has 5 fields instead of 6'),
+    (lambda text: text.replace(',0.0,1.0,0\n', ',0.0,1.0\n', 1), 'log.csv:2: the row has 5 fields instead of 6'),
     (lambda text: text.replace('\n0.0,', '\ninf,'), 'time_s is inf in row 1; give a time in seconds'),
     (lambda text: text.replace('\n0.0,0,', '\n0.0,inf,'), 'upper_counts is inf in row 1; give whole counts of the encoder'),
     (lambda text: text.replace('\n0.0,0,', '\n0.0,1e30,'), 'upper_counts is 1e.30 in row 1; give whole counts'),
     (lambda text: text.replace('\n0.0,0,', '\n0.0,0.5,'), 'upper_counts is 0.5 in row 1; give whole counts'),
     (lambda text: re.sub(r'\n([^,]+)', lambda row: f'\n{1000 * float(row[1] or 0):.9g}', text[:-1]) + '\n',
      'time_s rises by 1 from row to row; give seconds'),
-    (lambda text: 'nonsense', 'lacks the columns time_s'),
-    (lambda text: text.replace(',0.0,1.0,', ',0.0,one,'), 'the column motor_pwm holds texts'),
+    (lambda text: 'nonsense\n1\n', 'lacks the columns time_s'),
+    (lambda text: text.replace(',0.0,1.0,', ',0.0,one,'), 'log.csv:2: motor_pwm: "one" is not a number'),
 ])
 def test_what_is_no_log_is_refused(logs, tmp_path, change, words):
     file = tmp_path / 'log.csv'

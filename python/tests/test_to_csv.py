@@ -131,3 +131,21 @@ def test_what_the_command_reads_is_not_replaced(tmp_path, abs_hil_program, capsy
         assert str(out) in capsys.readouterr().err
     assert {path: path.read_bytes() for path in (tmp_path / 'run').iterdir()} == before
     assert not pathlib.Path(tmp_path / 'no').exists()
+
+
+def test_as_users_run_it(tmp_path, abs_hil_program):
+    log, out = tmp_path / 'run.lcmlog', tmp_path / 'made.csv'
+    abs_hil_program(*QUICK, '--log', log, '--out', tmp_path / 'run')
+    whole = log.read_bytes()
+    assert abs_hil_program('convert', log, out).stdout.endswith('; lost: nothing\n')
+    log.write_bytes(whole[:-5])
+    assert 'lost: parts of the log are not used: ' in abs_hil_program('convert', log, out).stdout
+    log.write_bytes(whole + whole)
+    assert f"'{log}' holds 2 runs: give '{log}#1' for the first" in abs_hil_program('convert', log, out, status=2).stderr
+    assert abs_hil_program('log', 'info', log).stdout.count('completed: experiment ran to its end') == 2
+    log.write_bytes(b'')
+    assert f'{log}: the file is empty' in abs_hil_program('convert', log, out, status=2).stderr
+    with open(tmp_path / 'run' / 'run.lcmlog', 'ab') as file:
+        file.write(b'x')
+    assert 'is not as it was recorded' in abs_hil_program('convert', tmp_path / 'run', out, status=2).stderr
+    assert abs_hil_program('log', 'info', tmp_path / 'nowhere', log, status=2).stderr.count('\n') == 2

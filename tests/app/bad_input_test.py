@@ -92,8 +92,7 @@ class BadInput(ProgramTest):
         for args, words in ((['--fast', '--no-lcm', '--config', config, '--csv', config], 'this command reads it'),
                             (['--fast', '--no-lcm', '--csv', both, '--log', both], 'another result goes into the same file'),
                             (['replay', log, '--csv', log], 'this command reads it'),
-                            (['replay', run, '--csv', run / 'run.csv'], 'this command reads it'),
-                            (['convert', log, self.folder / 'no' / 'x.csv'], 'there is no folder')):
+                            (['replay', run, '--csv', run / 'run.csv'], 'this command reads it')):
             result = self.run_program(*args)
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn(words, result.stderr)

@@ -400,7 +400,7 @@ class Files(ReportTest):
                 ([*lines[:50], 'garbage\n', *lines[50:]], 'broken.csv:51: time_s: "garbage" is not a number'),
                 ([*lines[:50], *lines[20:]], 'broken.csv:51: time_s decreases'),
                 (['time_s,phase\n', '0,idle\n'], 'broken.csv:1: the header lacks omega1_rad_s'),
-                (['\x7fELF\x01\x01\x00' * 30_000], 'broken.csv:1: ')):
+                (['\x7fELF\x01\x01\x00' * 30_000], 'broken.csv" is no recording')):
             broken.write_text(''.join(text))
             self.assertIn(says, self.report(broken, status=2).stderr.decode())
             self.assertFalse((self.folder / 'report.html').exists())
