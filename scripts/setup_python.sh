@@ -28,7 +28,8 @@ exec 9>build/python.lock
 # What the environment was made from; a stamp for each list holds it.
 state() {
   { cat scripts/python_environment.py "${requirements[@]/#/scripts/}"; "$python" -VV
-    dpkg-query -W -f='${Package} ${Version}\n' 'python3*'; ls "$environment"/lib/python*/site-packages; } 2>/dev/null | sha256sum
+    dpkg-query -W -f='${Package} ${Version}\n' 'python3*' || true
+    ls "$environment"/lib/python*/site-packages || true; } 2>/dev/null | sha256sum
 }
 current=$(state)
 for list in "${requirements[@]}"; do

@@ -22,6 +22,7 @@ make_bare_root() {
     debootstrap --variant=minbase --include=ca-certificates,git bookworm "$1" "$mirror" >"$1.log" 2>&1 || { tail -20 "$1.log"; exit 1; }
     rm -f "$1.log"
   fi
+  echo force-unsafe-io >"$1/etc/dpkg/dpkg.cfg.d/unsafe-io"  # a scratch disk need not survive a power cut
   chmod 755 "$1"  # mktemp's is closed to others than root, and so were everything in it
   cp /etc/resolv.conf "$1/etc/resolv.conf"
   # The certificates that this computer trusts: its mirrors of the package registries may have their own.

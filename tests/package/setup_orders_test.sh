@@ -15,9 +15,11 @@ source=$(realpath "$1") kinds=${2:-newest lowest}
 [ -x "$source/build/release/bin/abs_report" ] || { echo "SKIPPED: no $source/build/release/bin/abs_report"; exit 77; }
 
 if [ "${ABS_HIL_OWN_MOUNTS:-}" != 1 ]; then
-  ABS_HIL_ORDERS=$(mktemp -d /var/tmp/abs_hil_orders.XXXXXX)
+  if [ -z "${ABS_HIL_ORDERS:-}" ]; then  # a folder to be kept, for who looks for a cause
+    ABS_HIL_ORDERS=$(mktemp -d /var/tmp/abs_hil_orders.XXXXXX)
+    trap 'rm -rf --one-file-system "$ABS_HIL_ORDERS"' EXIT
+  fi
   export ABS_HIL_ORDERS
-  trap 'rm -rf --one-file-system "$ABS_HIL_ORDERS"' EXIT
   own_mounts "$@"
 fi
 declare -A every=([newest]="ABCDE ADB ADEBC AEDB ADCBE ACEB BAD VDAB VEAB BVEAC AuB ALuBE AOB AOE ANE" [lowest]="ADE AEB VEAB AuB")
@@ -91,7 +93,9 @@ for kind in $kinds; do
   [ "$kind" = newest ] || sed -i 's/>=/==/' "$root$source"/scripts/python-packages*.txt
   inside apt-get update -qq
   leave
-  for order in ${*:3} $([ $# -gt 2 ] || echo "${every[$kind]}"); do
+  read -ra orders <<<"${every[$kind]}"
+  [ $# -lt 3 ] || orders=("${@:3}")
+  for order in "${orders[@]}"; do
     lower=$tree:$work/base log=$work/$kind-$order.log status=0 begin=$SECONDS
     for ((i = 1; i <= ${#order}; ++i)); do
       layer=$tree-${order:0:i}
