@@ -1,4 +1,5 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
+import contextlib
 import functools
 import operator
 import os
@@ -36,7 +37,8 @@ def failed(name: str, error: object, status: int = 2) -> int:
         error, status = missing, 3
     if isinstance(error, OSError) and error.filename:
         error = f'{error.filename}: {refusal(error, deed="reach")}'
-    print(f'{name}: {error}', file=sys.stderr)
+    with contextlib.suppress(BrokenPipeError):
+        print(f'{name}: {error}', file=sys.stderr)
     return status
 
 

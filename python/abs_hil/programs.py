@@ -33,7 +33,7 @@ def _plainly(error: UnicodeError) -> tuple[bytes, int]:
 
 
 class _Output(io.FileIO):
-    """Standard output or error that remembers why it could not be written."""
+    """Standard output that remembers why it could not be written."""
     problem: OSError | None = None
     endless = False  #: the program goes on until nobody reads; any other ends its work, for its files
 
@@ -60,8 +60,6 @@ def start(name: str, arguments: list[str]) -> int:
     codecs.register_error('abs_hil', _plainly)
     sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors='abs_hil',
                                   line_buffering=bool(sys.stdout.line_buffering))
-    sys.stderr = io.TextIOWrapper(io.BufferedWriter(_Output(2, 'wb', closefd=False)), encoding=sys.stderr.encoding,
-                                  errors='backslashreplace', line_buffering=True)
     status = _start(name, arguments)
     with contextlib.suppress(OSError):
         sys.stdout.flush()

@@ -317,11 +317,14 @@ def test_packages_and_helpers_of_this_folder_are_taken(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     before = dict(sys.modules)
     (tmp_path / 'test').mkdir()
-    (tmp_path / 'test/__init__.py').write_text('')
+    (tmp_path / 'test/__init__.py').write_text('from .gains import K\n')
     (tmp_path / 'test/laws.py').write_text('from . import gains\nimport helper_of_law\n' + LAW)
     (tmp_path / 'test/gains.py').write_text('K = 3\n')
     (tmp_path / 'helper_of_law.py').write_text('')
     assert pathlib.Path(inspect.getfile(type(made('test.laws:Law')))) == tmp_path / 'test/laws.py'
+    (tmp_path / 'json').mkdir()  # without __init__.py
+    (tmp_path / 'json/laws.py').write_text(LAW)
+    assert pathlib.Path(inspect.getfile(type(made('json.laws:Law')))) == tmp_path / 'json/laws.py'
     (tmp_path / 'code.py').write_text('import nothing_of_this_name\n')
     for _ in range(2):  # a module that failed is no module the second time
         with pytest.raises(ValueError, match='No module named .nothing_of_this_name'):

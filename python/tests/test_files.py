@@ -104,8 +104,7 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
         assert result.stderr.count('\n') == 1, result
     made = tmp_path / 'made'
     for words in (('report', '--csv', tmp_path / 'run'), ('report', '--json', tmp_path / 'run'), ('report', '--octave', tmp_path / 'run'),
-                  ('report', '--table', tmp_path / 'run'), ('report', '--help'), ('report', '--output', made, tmp_path / 'run'),
-                  ('rig', '--out', made), ('export-fmu', '--out', f'{made}.fmu'), ('tune', '--help')):
+                  ('report', '--table', tmp_path / 'run'), ('report', '--help'), ('rig', 'steady', '1', '--out', made), ('export-fmu', '--out', f'{made}.fmu'), ('tune', '--help')):
         nobody, out = os.pipe()
         os.close(nobody)
         result = subprocess.run(command(*words), stdout=out, stderr=subprocess.PIPE, text=True)

@@ -85,7 +85,7 @@ std::unique_ptr<GuardianLease> GuardianLease::ask(const std::string& path, const
   if (socket.get() < 0) {
     if (errno == ENOENT || errno == ECONNREFUSED) return nullptr;
     const std::string why = why_not(errno);
-    refuse_run("cannot reach the resident service at " + path + ": " + why);
+    refuse_run("cannot reach the resident service at " + path + " (guardian.socket): " + why);
   }
   const driver::FileDescriptor self(open_pidfd(::getpid()));
   if (self.get() < 0) refuse_run(std::string("cannot open a pidfd of this process: ") + std::strerror(errno));

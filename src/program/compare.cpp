@@ -59,7 +59,7 @@ int record(const CompareOptions& options, const study::Study& study, const std::
     if (!options.out.empty()) folder = options.out.front();
     if (folder && contenders.size() > 1) {
       constexpr std::size_t number_bytes = 12;
-      std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes);
+      std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes, '_');
       while (!names.insert(name).second) name += fmt::format("-{}", c + 1);
       *folder += '/' + name;
     }

@@ -45,6 +45,7 @@ constexpr ErrorRow errors[] = {
     {EFBIG, 0, any, "the file reached the size limit: raise it (ulimit -f), or log less"},
     {EMFILE, 0, any, "too many open files: raise the limit (ulimit -n)"},
     {ENFILE, 0, any, "all programs together have too many open files: raise the limit (sysctl fs.file-max)"},
+    {ENAMETOOLONG, 0, reaching, "choose a shorter path: that of a socket has 107 bytes at most"},
     {ENAMETOOLONG, 0, any, "choose a shorter name: 255 bytes at most, 4095 with all its directories"},
     {ELOOP, 0, any, "its symbolic links lead in a circle: remove them"},
     {ETXTBSY, 0, any, "a program runs from this file: end it first, or choose another name"},

@@ -53,7 +53,7 @@ std::string in_ascii(char32_t code, std::string_view bytes) {
 
 }  // namespace
 
-std::string folder_name(std::string_view text, const fs::path& parent, std::size_t spare_bytes) {
+std::string folder_name(std::string_view text, const fs::path& parent, std::size_t spare_bytes, char odd) {
   std::string name;
   for (std::size_t size = 0; !text.empty(); text.remove_prefix(size)) {
     const auto first = static_cast<unsigned char>(text.front());
@@ -61,7 +61,11 @@ std::string folder_name(std::string_view text, const fs::path& parent, std::size
     char32_t code = size == 1 ? first : first & (0x7FU >> size);
     for (const char c : text.substr(1, size - 1)) code = code << 6U | (static_cast<unsigned char>(c) & 0x3FU);
     const std::string piece = in_ascii(code, text.substr(0, size));
-    if (piece != "-" || (!name.empty() && name.back() != '-')) name += piece;
+    if (piece != "-") {
+      name += piece;
+    } else if (odd != '-' || (!name.empty() && name.back() != odd)) {
+      name += odd;
+    }
   }
   std::size_t most = 255;
 #ifndef _WIN32

@@ -108,8 +108,9 @@ StudyScript load_study(const std::string& path) {
   std::error_code error;
   std::ifstream file(path, std::ios::binary);
   if (const int why = errno; !std::filesystem::is_regular_file(path, error) || !file) {
-    throw config::ConfigError(fmt::format("{}: {}; give a study, a TOML file (docs/studies.md)", path,
-                                          file ? "not a regular file" : rig::refusal(why, path, rig::reading)));
+    throw config::ConfigError(path + ": " +
+                              (file || why == ENOENT ? "no such file; give a study, a TOML file (docs/studies.md)"
+                                                     : rig::refusal(why, path, rig::reading)));
   }
   return parse_study({std::istreambuf_iterator<char>(file), {}}, path);
 }

@@ -17,16 +17,22 @@ def _imported(name: str) -> Any:
         sys.path.append('')  # the folder in which the program was started, as of `python -m`
     top = name.partition('.')[0]
     here, known = importlib.machinery.PathFinder.find_spec(top, [os.getcwd()]), importlib.util.find_spec(top)
-    if here is None or here.origin is None or known is not None and known.origin == here.origin:
+    plain_folder = here is not None and here.origin is None
+    if here is None or plain_folder and name == top or known is not None and known.origin == here.origin:
         return importlib.import_module(name)
     alias = f'{top}_of_this_folder'  # who imports the other one must still get that
     if alias not in sys.modules:
-        own = importlib.util.spec_from_file_location(alias, here.origin,
-                                                     submodule_search_locations=here.submodule_search_locations)
-        assert own is not None and own.loader is not None
-        module = importlib.util.module_from_spec(own)
-        own.loader.exec_module(module)
-        sys.modules[alias] = module
+        own = importlib.machinery.ModuleSpec(alias, None, is_package=True) if plain_folder else \
+            importlib.util.spec_from_file_location(alias, here.origin)
+        assert own is not None
+        own.submodule_search_locations = here.submodule_search_locations
+        module = sys.modules[alias] = importlib.util.module_from_spec(own)
+        try:
+            if own.loader is not None:
+                own.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[alias]
+            raise
     return importlib.import_module(alias + name.removeprefix(top))
 
 
