@@ -19,8 +19,8 @@ from typing import NamedTuple
 #: programs that people start, but for `abs_hil NAME`, which is abs_NAME
 OTHERS = ('abs_guardian', 'abs_rig_emulator')
 #: option -> the names that `abs_hil list` has under this heading
-NAMES = {'--controller': 'controllers', '--controllers': 'controllers', '--plant': 'plants', '--plants': 'plants', '--model': 'plants',
-         '--start': 'plants', '--experiment': 'experiments', '--set': 'keys', 'EXPERIMENT': 'experiments'}
+NAMES = {'--controller': 'controllers', '--controllers': 'controllers', '--plant': 'plants', '--plants': 'plants',
+         '--model': 'plants', '--start': 'plants', '--experiment': 'experiments', '--set': 'keys', 'EXPERIMENT': 'experiments'}
 
 
 class Option(NamedTuple):
@@ -79,7 +79,9 @@ def command_of(text: str) -> tuple[Command, list[str]]:
             words.append((left, meaning))
         elif section.startswith('positional'):
             name, _, kind = left.partition(' ')
-            said = re.findall(r'(?:^|\| )([a-z-]+)', meaning) if ' | ' in meaning else re.findall(r'[\w-]+', left) if '{' in left else []
+            said = re.findall(r'[\w-]+', left) if '{' in left else []
+            if ' | ' in meaning:
+                said = re.findall(r'(?:^|\| )([a-z-]+)', meaning)
             words += [(word, '') for word in said]
             if not said:
                 argument = value_of([name], f'{name} {kind}')
@@ -284,7 +286,9 @@ def fish(tables: Tables) -> str:
         if value in ('files', 'any', ''):
             return ''
         names = f'(__abs_hil_names {value})' if value in NAMES.values() else value
-        return ' -a ' + quoted(f'(__fish_complete_list , "__abs_hil_names {value}")' if several and value in NAMES.values() else names)
+        if several and value in NAMES.values():
+            names = f'(__fish_complete_list , "__abs_hil_names {value}")'
+        return ' -a ' + quoted(names)
     lines = [FISH]
     for program in [*tables.programs, *tables.in_python]:
         lines.append(f'complete -c {program} -f')

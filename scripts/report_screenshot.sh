@@ -14,7 +14,7 @@ trap 'rm -r "$data"' EXIT
 for controller in adaptive sliding-mode; do
   "$programs/abs_hil" --backend sim --fast --no-lcm --controller "$controller" --out "$data/$controller" >/dev/null
 done
-"$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --output "$data/report.html" >/dev/null
+"$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --out "$data/report.html" >/dev/null
 chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$data/profile" \
   --virtual-time-budget=10000 --window-size=1400,900 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
 # 64 colours show the same and need a third of the bytes. Pillow comes with the report's matplotlib.

@@ -53,5 +53,5 @@ while kill -0 "$pid" 2>/dev/null; do  # a signal interrupts `wait`, not the run
   wait "$pid" || status=$?
 done
 # A run that a fault ended gets a report too. A run that never began has no rows.
-if [ -s "$folder/run.csv" ]; then "$root/build/release/bin/abs_report" "$folder" --output "$folder/report.html" || true; fi
+if [ -s "$folder/run.csv" ]; then "$root/build/release/bin/abs_report" "$folder" --out "$folder/report.html" || true; fi
 exit "$status"

@@ -86,8 +86,7 @@ void OutputFile::begin(const std::string& file) {
   end();
   if (file == "off") return;
   open(name_ = file);
-  if (!is_open())
-    throw std::runtime_error("cannot write \"" + file + "\": " + rig::refusal(errno, file, rig::writing));
+  if (!is_open()) throw std::runtime_error("cannot write \"" + file + "\": " + rig::refusal(errno, file, rig::writing));
 }
 
 void OutputFile::end() {

@@ -3,6 +3,7 @@ that --help, --version and a wrong option need no package."""
 import argparse
 import pathlib
 import re
+import textwrap
 from collections.abc import Callable
 
 #: formats of figures as files, and of exported rows
@@ -12,8 +13,23 @@ VARY = 'parameters=0.1,theta=0.1,phase'
 PORT, FOXGLOVE_PORT = 8265, 8765
 
 
+#: endings of all files that programs of this project write or read
+_FORMATS = ('.csv', '.json', '.html', '.lcmlog', '.mcap', '.parquet', '.pdf', '.svg', '.png', '.md', '.toml', '.mat', '.fmu',
+            '.xlsx', '.txt')
+
+
+class _WholeWords(argparse.HelpFormatter):
+    """Help that is broken at spaces alone: no name is cut at its dashes."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(' '.join(text.split()), width, break_long_words=False, break_on_hyphens=False)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return '\n'.join(indent + line for line in self._split_lines(text, width - len(indent)))
+
+
 def _parser(prog: str, description: str) -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(prog, description=description, allow_abbrev=False)
+    made = argparse.ArgumentParser(prog, description=description, allow_abbrev=False, formatter_class=_WholeWords)
     made.add_argument('--version', action='store_true', help='show version and commit, and exit')  # abs_hil.programs does
     return made
 
@@ -27,6 +43,15 @@ def whole(least: int, most: int) -> Callable[[str], int]:
     return number
 
 
+def to_write(*endings: str) -> Callable[[str], pathlib.Path]:
+    """A type of argparse: a file to write, or without endings a folder, whose name promises no other format."""
+    def path(text: str) -> pathlib.Path:
+        if text.endswith(_FORMATS) and not (endings and text.endswith(endings)):
+            raise argparse.ArgumentTypeError(f'"{text}": give ' + (' or '.join(f'FILE{one}' for one in endings) or 'a folder'))
+        return pathlib.Path(text)
+    return path
+
+
 def _port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f'"{text}" is no number in [0, 65535]; LOG stands before --foxglove')
@@ -38,7 +63,7 @@ def report() -> argparse.ArgumentParser:
     made._negative_number_matcher = re.compile(r'-[\d.]')  # --window -5:1 has a value
     made.add_argument('runs', metavar='RUN', nargs='+',
                       help='run folders, series folders, files of runs (event log, CSV, MCAP, Parquet); or the folder of a study')
-    made.add_argument('--output', metavar='FILE', default='',
+    made.add_argument('--out', '--output', metavar='FILE', default='', dest='output',
                       help='file of the page (default: report.html) or of the exported rows (default: stdout)')
     made.add_argument('--force', action='store_true', help='replace existing files')
     made.add_argument('--title', metavar='TEXT', default='', help='heading of the page')
@@ -53,9 +78,9 @@ def report() -> argparse.ArgumentParser:
     made.add_argument('--figures', metavar='DIR', default='', help='folder for the figures as separate files')
     made.add_argument('--format', choices=PICTURES, default=None, help='format of these files [svg]')
     made.add_argument('--table', action='store_true', help='print the figures of merit as a plain table; makes no page')
-    made.add_argument('--merits', metavar='FILE', default='',
+    made.add_argument('--merits', metavar='FILE', type=to_write('.csv'),
                       help='write the figures of merit as CSV, one row a run, numbers in full')
-    exports = made.add_argument_group('export', 'export rows instead of a page, to --output or stdout')
+    exports = made.add_argument_group('export', 'export rows instead of a page, to --out or stdout')
     one = exports.add_mutually_exclusive_group()
     for kind, what in zip(EXPORTS, ("all runs in one CSV, with the run's name in the first column", 'runs with summaries, one '
                                     'array per column', 'MAT-file for Octave, MATLAB, SciPy', 'Parquet file')):
@@ -72,7 +97,7 @@ def tune() -> argparse.ArgumentParser:
     made.add_argument('--plants', metavar='A,B,...', default='paper-table1,paper-timing',
                       help='plants to tune on [paper-table1,paper-timing]')
     made.add_argument('--model', metavar='NAME|FILE', help="the controllers' model, by name or TOML file (default: each plant)")
-    made.add_argument('--folder', metavar='DIR', required=True, type=pathlib.Path,
+    made.add_argument('--out', '--folder', metavar='DIR', required=True, type=to_write(), dest='folder',
                       help='folder for CONTROLLER.toml; made if there is none')
     made.add_argument('--cases', metavar='N', default=6, type=whole(1, 1000), help='varied plants for each plant [6]')
     made.add_argument('--generations', metavar='N', default=24, type=whole(1, 10_000), help='generations of the search [24]')
@@ -90,7 +115,8 @@ def learn() -> argparse.ArgumentParser:
     made.add_argument('--generations', metavar='N', type=whole(1, 10**6), default=60, help='generations of the search [60]')
     made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the search [1]')
     made.add_argument('--judge', metavar='N', type=whole(1, 10**6), default=100, help='plants on which the result is judged [100]')
-    made.add_argument('--output', metavar='FILE', type=pathlib.Path, help='write the weights and the curve as JSON')
+    made.add_argument('--out', '--output', metavar='FILE', type=to_write('.json'), dest='output',
+                      help='write the weights and the curve as JSON')
     made.add_argument('--figure', metavar='FILE', type=pathlib.Path, help='draw the learning curve (SVG, PDF or PNG)')
     return made
 
@@ -109,7 +135,7 @@ def identify() -> argparse.ArgumentParser:
     made.add_argument('--form', metavar='NAME', default='auto', help='form of the plant: magic-formula, inteco-mu, or auto: the '
                       'one that better predicts left-out logs [auto]')
     made.add_argument('--validate', metavar='FOLDER', help='run folder, not among the logs, whose stop is predicted')
-    made.add_argument('--out', metavar='DIR', type=pathlib.Path, default=pathlib.Path('identified'),
+    made.add_argument('--out', metavar='DIR', type=to_write(), default=pathlib.Path('identified'),
                       help='folder for model.toml, identified.json and report.html [identified]')
     made.add_argument('--force', action='store_true', help='replace existing files')
     made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the bootstrap [1]')
@@ -134,8 +160,8 @@ def benchmark() -> argparse.ArgumentParser:
     made.add_argument('--verify', metavar='FILE', type=pathlib.Path,
                       help='makes the runs of a file of --json again; status 1 if anything differs')
     made.add_argument('--threads', metavar='N', type=whole(0, 1024), default=0, help='0: one for each processor')
-    made.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
-    made.add_argument('--page', metavar='FILE', type=pathlib.Path,
+    made.add_argument('--json', metavar='FILE', type=to_write('.json'), help='all scores and runs')
+    made.add_argument('--out', '--page', metavar='FILE', type=to_write('.html', '.md'), dest='page',
                       help='the page with the groups of cases: HTML with figures for FILE.html, otherwise Markdown')
     return made
 
@@ -177,7 +203,7 @@ def export_fmu() -> argparse.ArgumentParser:
     made.add_argument('--set', metavar='KEY=VALUE', action='append', help='set any configuration value (abs_hil list --keys); may '
                       'be repeated')
     made.add_argument('--fmi', metavar='N', type=int, default=2, help='version of FMI, 2 or 3 [%(default)s]')
-    made.add_argument('--out', metavar='FILE.fmu', type=pathlib.Path, required=True, help='file to write')
+    made.add_argument('--out', metavar='FILE.fmu', type=to_write('.fmu'), required=True, help='file to write')
     made.add_argument('--force', action='store_true', help='replace an existing file')
     return made
 
@@ -203,7 +229,7 @@ def serve() -> argparse.ArgumentParser:
 
 def lab() -> argparse.ArgumentParser:
     made = _parser('abs_hil lab', 'A page that simulates the rig and its controllers in the browser, without a server.')
-    made.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('lab.html'), help='the page (lab.html)')
+    made.add_argument('--out', metavar='FILE', type=to_write('.html'), default=pathlib.Path('lab.html'), help='page [lab.html]')
     exercises = sorted(path.stem for path in (pathlib.Path(__file__).parent / 'lab' / 'exercises').glob('*.toml'))
     made.add_argument('--exercise', metavar='FILE', help='a TOML file that says what the page asks, hides and offers; or one that '
                       'is ready: ' + ', '.join(exercises))
@@ -223,7 +249,7 @@ def rig() -> argparse.ArgumentParser:
     made = _parser('abs_hil rig', 'Writes a simulated rig that a class does not know, as a file for --plant (docs/class.md)')
     made.add_argument('kind', choices=('steady', 'wandering'), help='whether it changes a little all the time')
     made.add_argument('seed', metavar='SEED', type=whole(0, 2**63 - 1), help='which one; the same number is the same rig')
-    made.add_argument('--out', metavar='FILE', type=pathlib.Path, default=pathlib.Path('rig.toml'), help='[rig.toml]')
+    made.add_argument('--out', metavar='FILE', type=to_write('.toml'), default=pathlib.Path('rig.toml'), help='[rig.toml]')
     made.add_argument('--force', action='store_true', help='replace an existing file')
     return made
 

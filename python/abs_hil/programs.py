@@ -75,7 +75,7 @@ def start(name: str, arguments: list[str]) -> int:
 def version(name: str) -> str:
     """What --version prints: program, version and commit, of the compiled module."""
     from .core import _core
-    return f'abs_{name} {_core.version} ({_core.revision})'
+    return f'abs_{name} {_core.version}' + (f' ({_core.revision})' if _core.revision != 'unknown' else '')
 
 
 def _start(name: str, arguments: list[str]) -> int:

@@ -194,7 +194,7 @@ def to_toml(judge: Judge, found: Found, comment: str) -> str:
 def _tune(controller: str, o: argparse.Namespace) -> None:
     plants = [name for name in o.plants.split(',') if name]
     judge = Judge(controller, Training(plants, o.cases, o.model, o.threads))
-    make_folder(o.folder, '--folder')
+    make_folder(o.folder, '--out')
     path = o.folder / f'{controller}.toml'
     write_whole(path, lambda name: None, probe=True)
 

@@ -15,10 +15,10 @@ from abs_hil.identification.parameters import FORMS
 #: where this package is; Python without any other has its folder alone
 PLACES = [str(pathlib.Path(folder).parent) for folder in abs_hil.__path__]
 #: program -> arguments with which it reaches its packages
-WORK = {'report': ['{run}', '--output', '{out}/page.html', '--force', '--figures', '{out}/figures'],
-        'tune': ['--folder', '{out}', '--controllers', 'pi', '--generations', '1'],
+WORK = {'report': ['{run}', '--out', '{out}/page.html', '--force', '--figures', '{out}/figures'],
+        'tune': ['--out', '{out}', '--controllers', 'pi', '--generations', '1'],
         'learn': ['--generations', '1', '--figure', '{out}/curve.svg'], 'identify': ['{run}', '--out', '{out}/identified'],
-        'benchmark': ['--quick', '--controller', 'pi', '--page', '{out}/page.html'], 'convert': ['{run}', '{out}/run.mcap'],
+        'benchmark': ['--quick', '--controller', 'pi', '--out', '{out}/page.html'], 'convert': ['{run}', '{out}/run.mcap'],
         'watch': ['--window', '10'], 'export-fmu': ['--out', '{out}/rig.fmu', '--force'], 'serve': ['{run}', '--port', '-1'],
         'lab': ['--out', '{out}/lab.html'], 'rig': ['steady', '1', '--out', '{out}/rig.toml', '--force'], 'python_host': []}
 #: package -> programs that need it for this
@@ -84,6 +84,32 @@ def test_help_and_version_need_no_package(name):
 
 def test_help_names_the_forms():
     assert all(name in parsers.identify().format_help() for name in FORMS)
+
+
+#: program -> what comes before its --out, the name that was once its option, endings that are refused, what is possible
+OUT = {'report': (['a'], '--output', ['.pdf', '.csv', '.json', '.md'], 'FILE.html'),
+       'tune': ([], '--folder', ['.toml', '.json'], 'a folder'), 'learn': ([], '--output', ['.csv', '.svg'], 'FILE.json'),
+       'identify': (['a'], '--out', ['.toml', '.html'], 'a folder'),
+       'benchmark': ([], '--page', ['.pdf', '.json'], 'FILE.html or FILE.md'),
+       'export-fmu': ([], '--out', ['.zip.pdf', '.so.csv'], 'FILE.fmu'), 'lab': ([], '--out', ['.pdf'], 'FILE.html'),
+       'rig': (['steady', '1'], '--out', ['.json', '.csv'], 'FILE.toml')}
+
+
+@pytest.mark.parametrize('name', OUT)
+def test_a_name_that_promises_another_format_is_refused_with_those_possible(name, tmp_path, capfd):
+    before, old, endings, possible = OUT[name]
+    for option in dict.fromkeys(['--out', old]):
+        for ending in endings:
+            assert programs.start(name, [*before, option, str(tmp_path / f'x{ending}')]) == 2
+            assert f'x{ending}": give {possible}' in capfd.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(('kind', 'ending'), [('csv', 'csv'), ('json', 'json'), ('octave', 'mat'), ('parquet', 'parquet')])
+def test_exported_rows_have_the_ending_of_their_format(kind, ending, run, tmp_path, capfd):
+    assert programs.start('report', [f'--{kind}', str(run), '--out', str(tmp_path / 'rows.html')]) == 2
+    assert f'give FILE.{ending}' in capfd.readouterr().err
+    assert list(tmp_path.glob('rows*')) == []
 
 
 @pytest.fixture

@@ -85,15 +85,15 @@ def test_unusable_names():
 @pytest.mark.parametrize(('given', 'words'), [
     (['--controllers', ''], '--controllers, --plants: give at least one name'),
     (['--controllers', 'pi', '--plants', ','], '--controllers, --plants: give at least one name'),
-    (['--controllers', 'pi', '--folder', 'a-file'], '--folder "a-file" cannot be made: File exists; give a folder'),
+    (['--controllers', 'pi', '--folder', 'a-file'], '--out "a-file" cannot be made: File exists; give a folder'),
     (['--seed', '-1'], '"-1" is no whole number from 0 to'),
 ])
-def test_the_program_refuses_before_it_searches(given, words, tmp_path, monkeypatch, capsys):
+def test_the_program_refuses_before_it_searches(given, words, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tune, 'search', lambda *_: pytest.fail('it searches'))
     (tmp_path / 'a-file').write_text('')
     assert programs.start('tune', ['--folder', 'tu', '--cases', '1', *given]) == 2
-    assert words in capsys.readouterr().err
+    assert words in capfd.readouterr().err
     assert not (tmp_path / 'tu').exists()
 
 

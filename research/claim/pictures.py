@@ -72,7 +72,7 @@ def draw_figures(program: pathlib.Path, laws: Sequence[Entry], plant: str, folde
                     for word in ('--set', f'{key}={value!r}')]
             subprocess.run([program, '--backend', 'sim', '--fast', '--no-lcm', '--plant', plant, '--controller', law.controller,
                             *sets, '--out', data / str(number)], check=True, capture_output=True)
-        subprocess.run([program.with_name('abs_report'), '--paper', data / '0', data / '1', '--output', data / 'page.html',
+        subprocess.run([program.with_name('abs_report'), '--paper', data / '0', data / '1', '--out', data / 'page.html',
                         '--figures', data], check=True, capture_output=True)
         for name in DRAWN:
             drawn = (data / f'fig{name.partition("-")[0]}.svg').read_text(encoding='utf-8')

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <set>
 
@@ -27,11 +28,25 @@ struct CompareOptions {
   std::size_t repeat{100};
   std::uint64_t seed{1};
   std::optional<std::string> vary{};
-  std::size_t threads{0};          ///< 0: one for each processor
-  std::vector<std::string> out{};  ///< files of the table; with --run its folder
+  std::size_t threads{0};                                   ///< 0: one for each processor
+  std::optional<std::string> out{};                         ///< file of the table; with --run its folder
+  std::array<std::optional<std::string>, 3> table_files{};  ///< in the order of `formats`
   std::optional<std::string> runs_file{};
   std::optional<int> recorded_run{};  ///< --run: repeat this run of each controller in place of the comparison
 };
+
+/// Of the table as a file.
+struct Format {
+  std::string_view option;
+  std::string_view type;
+  std::string (*text)(const study::ComparisonTable& table, const std::string& config_json);
+};
+constexpr std::array<Format, 3> formats{
+    {{"--json", "FILE.json", &study::to_json},
+     {"--csv", "FILE.csv",
+      [](const study::ComparisonTable& table, const std::string&) { return study::to_csv(table); }},
+     {"--markdown", "FILE.md",
+      [](const study::ComparisonTable& table, const std::string&) { return study::to_markdown(table); }}}};
 
 /// Refuses a file name that is a number: --repeat was meant.
 void refuse_number(const std::optional<std::string>& file) {
@@ -51,12 +66,10 @@ int record(const CompareOptions& options, const study::Study& study, const std::
         fmt::format("--run {}: each controller has {} runs; give a number in [0, {}], or a larger --repeat", repetition,
                     options.repeat, options.repeat - 1));
   }
-  if (options.out.size() > 1) throw config::ConfigError("--out: with --run give one, a folder: nothing is compared");
   int status = exit_completed;
   std::set<std::string> names;
   for (std::size_t c = 0; c < contenders.size(); ++c) {
-    std::optional<std::string> folder;
-    if (!options.out.empty()) folder = options.out.front();
+    std::optional<std::string> folder = options.out;
     if (folder && contenders.size() > 1) {
       constexpr std::size_t number_bytes = 12;
       std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes, '_');
@@ -68,7 +81,18 @@ int record(const CompareOptions& options, const study::Study& study, const std::
   return status;
 }
 
-int compare_controllers(const CompareOptions& options, const std::vector<std::string>& command_line) {
+int compare_controllers(CompareOptions options, const std::vector<std::string>& command_line) {
+  if (options.out && !options.recorded_run) {
+    const auto ending = [](const Format& format) { return format.type.substr(std::string_view("FILE").size()); };
+    const auto format =
+        std::ranges::find_if(formats, [&](const Format& f) { return options.out->ends_with(ending(f)); });
+    if (format == formats.end()) {
+      throw config::ConfigError("--out " + *options.out +
+                                ": give FILE.json, FILE.csv or FILE.md for the table; a folder "
+                                "goes with --run K");
+    }
+    options.table_files[static_cast<std::size_t>(format - formats.begin())] = options.out;
+  }
   refuse_number(options.runs_file);
   config::Sources sources = options.sources;
   sources.defaults.emplace_back(study::start_speed_default);
@@ -84,7 +108,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
       {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
   if (options.recorded_run) return record(options, study, command_line);
   std::vector<std::unique_ptr<files::ResultFile>> tables;
-  for (const std::string& file : options.out) tables.push_back(open_result(file, "comparison"));
+  for (const auto& file : options.table_files) tables.push_back(open_result(file, "comparison"));
   const auto runs_file = open_result(options.runs_file, "comparison");
 
   study::RunsByController runs;
@@ -101,10 +125,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
   }
   const study::ComparisonTable table = study::tabulate(study, runs);
   for (std::size_t i = 0; i < tables.size(); ++i) {
-    const std::string& file = options.out[i];
-    tables[i]->write(file.ends_with(".json")  ? study::to_json(table, merged.json)
-                     : file.ends_with(".csv") ? study::to_csv(table)
-                                              : study::to_markdown(table));
+    if (tables[i]) tables[i]->write(formats[i].text(table, merged.json));
   }
   if (runs_file) runs_file->write(study::runs_csv(study, runs));
   cli::print(files::for_people(), "{}", study::to_text(table));
@@ -131,14 +152,18 @@ Action add_compare(cli::Parser& compare, const Words& words) {
   add_config_file(compare, o.sources);
   add_assignments(compare, o.sources);
   add_threads(compare, o.threads);
-  compare.add("--out,--json,--csv,--markdown", &o.out,
-              "the table as FILE.csv, FILE.json or FILE.md, or several; with --run its run folder, or one below it for "
-              "each controller",
-              {.type = "FILE.csv|FILE.json|FILE.md|DIR", .repeated = true});
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    compare.add(std::string(formats[i].option), &o.table_files[i], "write the table in this format",
+                {.type = std::string(formats[i].type)});
+  }
+  compare.add(
+      "--out", &o.out,
+      "write the table in the format of its ending; with --run its run folder, or one below it for each controller",
+      {.type = "FILE.json|FILE.csv|FILE.md|DIR", .excludes = {"--json", "--csv", "--markdown"}});
   compare.add("--runs", &o.runs_file, "write each run's results as CSV", {.type = "FILE.csv"});
   compare.add("--run", &o.recorded_run,
               "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
-              {.type = "K", .range = {0, 999'999}, .excludes = {"--runs"}});
+              {.type = "K", .range = {0, 999'999}, .excludes = {"--json", "--csv", "--markdown", "--runs"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
   return [options, words] { return compare_controllers(*options, words); };
 }

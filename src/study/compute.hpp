@@ -35,7 +35,7 @@ struct Shard {
 
 /// What became of runs.
 struct Tally {
-  std::uint64_t earlier{0};              ///< were there already; all others are those computed now
+  std::uint64_t earlier{0};  ///< were there already; all others are those computed now
   std::uint64_t runs{0};
   std::uint64_t faults{0};               ///< ended early
   std::uint64_t refused{0};              ///< could not begin, for their combination of values

@@ -83,15 +83,28 @@ class BadInput(ProgramTest):
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn('/nonexistent/dir/file', result.stderr)
 
+    def test_names_that_promise_another_format(self):
+        for option, name, right in (('--csv', 'a.parquet', 'FILE.csv'), ('--csv', 'a.json', 'FILE.csv'),
+                                    ('--log', 'a.csv', 'FILE.lcmlog'), ('--summary', 'a.csv', 'FILE.json'),
+                                    ('--out', 'a.csv', 'DIR'), ('--out', 'a.html', 'DIR')):
+            with self.subTest(option=option, name=name):
+                self.refused([option, self.folder / name], [option, name, f'give {right}'])
+        for args in (['compare', '--repeat', 1, '--out', 'a.pdf'], ['compare', '--repeat', 1, '--runs', 'a.json'],
+                     ['replay', 'a', '--out', 'a.mcap'], ['study', 'a.toml', '--out', 'a.parquet']):
+            with self.subTest(args=args):
+                result = self.run_program(*args, cwd=self.folder)
+                self.assertEqual((result.returncode, result.stderr.count('\n')), (2, 1), result.stderr)
+                self.assertIn('give ', result.stderr)
+
     def test_results_that_would_replace_an_input_or_each_other(self):
-        log, config, run = self.folder / 'run.lcmlog', self.folder / 'own.toml', self.folder / 'run'
+        log, config, run = self.folder / 'run.lcmlog', self.folder / 'own', self.folder / 'run'
         config.write_text('[control]\nslip_ref = 0.1\n')
         self.fast('--log', log, '--out', run)
         kept = {path: path.read_bytes() for path in (log, config, run / 'run.csv')}
         both = self.folder / 'both'
         for args, words in ((['--fast', '--no-lcm', '--config', config, '--csv', config], 'this command reads it'),
                             (['--fast', '--no-lcm', '--csv', both, '--log', both], 'another result goes into the same file'),
-                            (['replay', log, '--csv', log], 'this command reads it'),
+                            (['replay', log, '--csv', log], 'give FILE.csv'),
                             (['replay', run, '--csv', run / 'run.csv'], 'this command reads it')):
             result = self.run_program(*args)
             self.assertEqual(result.returncode, 2, result.stderr)

@@ -49,6 +49,18 @@ class Compare(ProgramTest):
         for key in ('stop_time_s', 'stop_distance_m', 'slip_rms', 'torque_total_variation_Nm', 'slip_overshoot'):
             self.assertEqual(metrics[key]['mean'], self.summary(summary)[key], key)
 
+    def test_out_is_the_table_in_the_format_of_its_ending(self):
+        for option, ending in (('--json', 'json'), ('--csv', 'csv'), ('--markdown', 'md')):
+            old, new = self.folder / f'old-{ending}', self.folder / f'new.{ending}'
+            self.run_program(*SMALL, option, old)
+            self.assertEqual(self.run_program(*SMALL, '--out', new).returncode, 0)
+            self.assertEqual(new.read_text(), old.read_text())
+        for bad in (('--out', self.folder / 'x'), ('--out', self.folder / 'x.pdf'),
+                    ('--out', self.folder / 'x.csv', '--csv', 'y.csv')):
+            result = self.run_program(*SMALL, *bad)
+            self.assertEqual((result.returncode, result.stdout), (2, ''), result.stderr)
+        self.assertEqual([file.name for file in self.folder.glob('x*')], [])
+
     def test_bad_input(self):
         for args, words in ((('--controllers', 'adaptive,nope'), ['nope']),
                             (('--controllers', 'adaptive,adaptive'), ['twice']),

@@ -13,16 +13,18 @@ import unittest
 PROGRAM, SCRIPT = pathlib.Path(sys.argv.pop(1)).resolve(), sys.argv.pop(1)
 FOLDER = PROGRAM.parent
 #: command lines whose last word is completed -> what is offered, in order
-PLACES = {('validate', 'pape'): 'paper', ('re',): 'replay report', ('va',): 'validate', ('hel',): 'help', ('help', 'va'): 'validate',
-          ('--contr',): '--controller --controllers', ('--plant', 'paper-table1', '--co'): '--config --controller --controllers',
+PLACES = {('validate', 'pape'): 'paper', ('re',): 'replay report', ('va',): 'validate', ('hel',): 'help',
+          ('help', 'va'): 'validate', ('--contr',): '--controller --controllers',
+          ('--plant', 'paper-table1', '--co'): '--config --controller --controllers',
           ('compare', '--controllers', 'adaptive,p'): 'adaptive,pi', ('--set', 'control.adaptive.g'): 'control.adaptive.gamma=',
-          ('--experiment', 'slip-s'): 'slip-sweep', ('--experiment', 'paper', '--backend', ''): 'rig sim', ('study', 'm'): 'merge',
-          ('send', 'st'): 'start stop', ('doctor', '--only', 'c'): 'can clock cpu', ('safe', '--'): '--config --help --insist --set',
-          ('convert', '--li'): '--live', ('rig', 's'): 'steady', ('tune', '--plants', 'paper-table1,inteco-m'): 'paper-table1,inteco-manual',
-          ('study', 'status', '--'): '--help', ('report', '--form'): '--format', ('report', '--format', 's'): 'svg'}
+          ('--experiment', 'slip-s'): 'slip-sweep', ('--experiment', 'paper', '--backend', ''): 'rig sim',
+          ('study', 'm'): 'merge', ('study', 'status', '--'): '--help', ('send', 'st'): 'start stop',
+          ('doctor', '--only', 'c'): 'can clock cpu', ('safe', '--'): '--config --help --insist --set',
+          ('convert', '--li'): '--live', ('rig', 's'): 'steady', ('report', '--form'): '--format',
+          ('tune', '--plants', 'paper-table1,inteco-m'): 'paper-table1,inteco-manual', ('report', '--format', 's'): 'svg'}
 PLACES_OF_OTHERS = {('abs_tune', '--contr'): '--controller --controllers', ('abs_guardian', 's'): 'serve',
                     ('abs_guardian', 'serve', '--so'): '--socket', ('abs_rig_emulator', '--wr'): '--wrong-board',
-                    ('abs_identify', '--form', 'm'): 'magic-formula'}
+                    ('abs_rig_emulator', '--bar-kind', 'm'): 'memory'}
 
 
 class Shell:
@@ -61,7 +63,8 @@ class Zsh(Shell):
 
 class Fish(Shell):
     def command(self) -> list[str]:
-        return ['fish', '--no-config', '-c', f'source {self.script}; complete -C (string join -- " " $argv) | string replace -r "\\t.*" ""; true']
+        return ['fish', '--no-config', '-c',
+                f'source {self.script}; complete -C (string join -- " " $argv) | string replace -r "\\t.*" ""; true']
 
 
 class Completion(unittest.TestCase):
@@ -104,8 +107,10 @@ class Completion(unittest.TestCase):
         self.assertGreater(len(names), 20)
         below = [('abs_hil', 'study', word) for word in ('merge', 'status', 'submit')]
         others = [(file.name,) for file in sorted(FOLDER.glob('abs_*'))
-                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_guardian', 'abs_convert')]
-        return [('abs_hil',), *(('abs_hil', name) for name in names if name != 'convert'), *below, ('abs_guardian', 'serve'), *others]
+                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_guardian',
+                                       'abs_convert')]
+        of_abs_hil = [('abs_hil', name) for name in names if name != 'convert']
+        return [('abs_hil',), *of_abs_hil, *below, ('abs_guardian', 'serve'), *others]
 
     def help(self, words: tuple[str, ...]) -> str:
         return subprocess.run([FOLDER / words[0], *words[1:], '--help'], capture_output=True, text=True, check=True,
@@ -124,7 +129,8 @@ class Completion(unittest.TestCase):
         for name in ('abs_hil', 'abs_guardian', 'abs_rig_emulator', 'abs_report', 'abs_tune'):
             if (FOLDER / name).exists():
                 self.assertEqual((self.made / 'bash' / name).read_text(), (self.made / 'bash' / 'abs_hil').read_text())
-                self.assertEqual((self.made / 'fish' / f'{name}.fish').read_text(), (self.made / 'fish' / 'abs_hil.fish').read_text())
+                fish = self.made / 'fish'
+                self.assertEqual((fish / f'{name}.fish').read_text(), (fish / 'abs_hil.fish').read_text())
                 self.assertIn(name, (self.made / 'zsh' / '_abs_hil').read_text().splitlines()[0].split())
 
     def test_the_script_for_one_shell_is_that_of_the_folder(self) -> None:
@@ -147,7 +153,8 @@ class Completion(unittest.TestCase):
         """A terminal, its own completion system, and a Tab."""
         script = self.shell('zsh', Zsh).script
         parent, child = pty.openpty()
-        with subprocess.Popen(['zsh', '-f', '-i'], stdin=child, stdout=child, stderr=child, start_new_session=True, cwd=self.folder,
+        with subprocess.Popen(['zsh', '-f', '-i'], stdin=child, stdout=child, stderr=child, start_new_session=True,
+                              cwd=self.folder,
                               env={**os.environ, 'PATH': f'{FOLDER}:{os.environ["PATH"]}', 'TERM': 'dumb'}) as shell:
             os.close(child)
             os.write(parent, f'fpath=({script.parent} $fpath); autoload -U compinit; compinit -u -D; '

@@ -66,7 +66,8 @@ class Help(unittest.TestCase):
                 self.assertEqual(told.count('\n'), 1)
                 self.assertIn('`abs_hil --fast`', told)
                 self.assertIn('`abs_hil --backend sim`', told)
-        for word, near in {'repot': 'report', 'ident': 'identify', 'conver': 'convert', 'stdy': 'study', 'benchmarks': 'benchmark'}.items():
+        for word, near in {'repot': 'report', 'ident': 'identify', 'conver': 'convert', 'stdy': 'study',
+                           'benchmarks': 'benchmark'}.items():
             with self.subTest(word):
                 self.assertIn(f'unknown subcommand {word}; the nearest is {near};', run('abs_hil', word, status=2))
 

@@ -178,7 +178,7 @@ plant.theta_N = {{ from = 15, to = 30 }}
         self.assertEqual(self.run_program(*args, '--runs', runs).returncode, 0)
         result = self.run_program(*args, '--run', 3, '--out', self.folder / 'three')
         self.assertEqual(result.returncode, 0, result.stderr)
-        for name, folder in (('adaptive', 'adaptive'), ('pi{kp_per_s=50}', 'pi_kp_per_s=50_')):
+        for name, folder in (('adaptive', 'adaptive'), ('pi{kp_per_s=50}', 'pi-kp_per_s=50')):
             row = next(row for row in self.rows(runs) if row['run'] == '3' and row['controller'] == name)
             self.assert_summary_has(self.folder / 'three' / folder, row)
         one = self.run_program('compare', '--controllers', 'adaptive', '--run', 3, '--out', self.folder / 'one')
@@ -254,7 +254,7 @@ plant.theta_N = {{ from = 15, to = 30 }}
             self.assert_refused(result, words)
             self.assertFalse((self.folder / 'bad').exists())
         self.study.write_text(STUDY)
-        for args, words in ((('study', self.folder / 'none.toml'), ['none.toml', 'no such file']),
+        for args, words in ((('study', self.folder / 'none.toml'), ['none.toml', 'No such file']),
                             (('study',), ['merge, status or submit']),
                             (('study', self.study), ['--out']),
                             (('study', self.study, '--out', 'x', '--shard', '3/2'), ['--shard 3/2']),

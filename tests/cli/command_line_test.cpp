@@ -331,7 +331,7 @@ TEST_CASE("help is broken between words at the terminal's width, below the text 
         "  -h,--help                   Print this help\n"
         "      message and exit\n"
         "  --file TEXT                 what the controller\n"
-        "      learns for the next braking on this rig,\n"
+        "      learns for the next braking on this rig, and\n"
         "      no more than that\n"
         "  --fault TEXT                given as\n"
         "      PHASE@SIGNAL:KIND[=PARAMETER][+DELAY] and so\n"

@@ -8,8 +8,8 @@ Checks README.md, CONTRIBUTING.md and the pages in docs: what they name must exi
   - `folder/file` and `file.hpp` are files of the tree.
 Words with a place holder (capitals, *, {, <, …, `plant.x`) are left out. unchecked_names.txt lists what is named although no
 source contains it, with the reason; an entry that no page needs is an error. Links must lead to files, and docs/index.md, or a
-page that it leads to, must lead to every page. All pages together have at most WORDS_AT_MOST words, as `wc -w` counts. Outside of fences no two blank lines follow each
-other: they are where a sentence was cut.
+page that it leads to, must lead to every page. All pages together have at most WORDS_AT_MOST words, as `wc -w` counts. Outside
+of fences no two blank lines follow each other: they are where a sentence was cut.
 """
 import pathlib
 import re

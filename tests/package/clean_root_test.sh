@@ -25,7 +25,7 @@ if [ "$what" = package ]; then
   inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/*abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
   step "run the installed program"
   inside abs_hil --backend sim --fast --no-lcm --out /tmp/run | grep -m 1 completed
-  inside abs_hil report /tmp/run --output /tmp/report.html
+  inside abs_hil report /tmp/run --out /tmp/report.html
   inside rm -r /tmp/run
   inside sh -c 'getent group abs_hil >/dev/null || { echo "the package made no group abs_hil"; exit 1; }'
   inside sh -c 'test -f /usr/lib/systemd/system/abs-guardian.service && test -f /etc/abs_hil/guardian.toml' ||

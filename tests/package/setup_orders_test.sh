@@ -70,14 +70,14 @@ work=$(mktemp -d) && cd "$work"
 modules() { for module; do "$python" -c "import $module" 2>/dev/null || return 1; done; }
 python=$OLDPWD/build/python/bin/python
 if [ -x "$python" ]; then
-  "$bin/abs_report" run --output page.html >/dev/null && "$bin/abs_hil" convert run run.mcap >/dev/null
+  "$bin/abs_report" run --out page.html >/dev/null && "$bin/abs_hil" convert run run.mcap >/dev/null
   "$python" -W ignore "$OLDPWD/scripts/python_environment.py" problems /usr/bin/python3 <("$python" "$OLDPWD/scripts/python_environment.py" constraints)
 else
   python=/usr/bin/python3
 fi
-if modules matplotlib; then "$bin/abs_report" run --output figures.html --figures figures >/dev/null; fi
-if modules scipy; then "$bin/abs_report" run --octave --output run.mat && "$bin/abs_hil" tune --controllers pi --generations 1 --cases 1 --folder tuned >/dev/null 2>&1; fi
-if modules pyarrow; then "$bin/abs_report" run --parquet --output run.parquet; fi
+if modules matplotlib; then "$bin/abs_report" run --out figures.html --figures figures >/dev/null; fi
+if modules scipy; then "$bin/abs_report" run --octave --out run.mat && "$bin/abs_hil" tune --controllers pi --generations 1 --cases 1 --folder tuned >/dev/null 2>&1; fi
+if modules pyarrow; then "$bin/abs_report" run --parquet --out run.parquet; fi
 "$python" -c 'import numpy, pandas; print("NumPy", numpy.__version__, "of", numpy.__file__, "pandas", pandas.__version__)'
 CHECK
   here_inside "bash /tmp/check.sh"

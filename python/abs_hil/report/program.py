@@ -113,14 +113,14 @@ def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
     with open(path, 'rb') as file:
         if PAGE_MARK.encode() in file.read(_MARK_BYTES):
             return
-    raise ValueError(f'"{path}" exists and is not a report of abs_report; give another --output, or --force to replace it')
+    raise ValueError(f'"{path}" exists and is not a report of abs_report; give another --out, or --force to replace it')
 
 
 def _export(o: argparse.Namespace, columns: list[str]) -> None:
     exporter = Exporter(find_runs(o.runs, o.labels).runs, columns)
     if o.output:
         path = pathlib.Path(o.output)
-        refuse_existing(path, '--output', o.force)
+        refuse_existing(path, '--out', o.force)
 
         def write(name: str) -> None:
             with open(name, 'wb') as file:
@@ -128,7 +128,7 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
         write_whole(path, write)
     else:
         if o.export in ('octave', 'parquet') and sys.stdout.isatty():
-            raise ValueError(f'--{o.export} writes a binary file: give --output FILE or redirect stdout')
+            raise ValueError(f'--{o.export} writes a binary file: give --out FILE or redirect stdout')
         whole = io.BytesIO()  # a MAT-file is not written in one go
         exporter.write(o.export, whole)
         with contextlib.suppress(OSError):  # abs_hil.programs tells it
@@ -154,7 +154,7 @@ def _report(o: argparse.Namespace) -> None:
     if o.merits:
         refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
         if not o.table and path.resolve() == pathlib.Path(o.merits).resolve():
-            raise ValueError(f'"{path}" is one file for --output and --merits; give two')
+            raise ValueError(f'"{path}" is one file for --out and --merits; give two')
     with progress_shown(sys.stderr.isatty()) as progress:
         runs, surveys, figures, parts = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
@@ -182,7 +182,7 @@ def _report_study(o: argparse.Namespace) -> None:
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:
-        refuse_existing(path, '--output', o.force)
+        refuse_existing(path, '--out', o.force)
         results.to_parquet(path)
     else:
         _check_replaceable(path, o.force)
@@ -205,6 +205,8 @@ def main(arguments: list[str]) -> int:
         if o.export and (o.paper or o.figures or o.table or o.merits):
             raise ValueError('--paper, --figures, --table and --merits show runs; --csv, --json, --octave and --parquet '
                              'export rows; give one kind only')
+        if o.output and not o.table:
+            parsers.to_write({None: '.html', 'octave': '.mat'}.get(o.export, f'.{o.export}'))(o.output)
         if o.metrics and not of_study:
             raise ValueError('--metric: only the page of a study has curves and maps of metrics')
         if of_study:
@@ -213,6 +215,6 @@ def main(arguments: list[str]) -> int:
             _export(o, columns)
         else:
             _report(o)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, argparse.ArgumentTypeError) as error:
         return failed('abs_report', error if misfit(error) else clean(error, 4000))
     return 0
