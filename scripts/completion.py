@@ -116,13 +116,10 @@ class Tables:
         if program == 'abs_guardian' and not rest:
             flags = [Option(['-h', '--help'], '', False, ''), Option(['--version'], '', False, '')]
             command, subcommands = Command(flags, [('serve', 'the resident service')], ''), ['serve']
-        if before := self.commands.get(path):  # `abs_hil convert` is two programs
-            known = {name for option in command.options for name in option.names}
-            command.options.extend(option for option in before.options if not known & set(option.names))
         self.commands[path or words] = command
         for name in subcommands:
             self.commands[f'{words} {name}'] = Command([], [], '')  # a program in Python is read later
-            if f'{words} {name}' != 'abs_hil ' + name or not (self.folder / f'abs_{name}').exists() or name == 'convert':
+            if f'{words} {name}' != 'abs_hil ' + name or not (self.folder / f'abs_{name}').exists():
                 self.add(f'{words} {name}')
 
 

@@ -238,10 +238,9 @@ def lab() -> argparse.ArgumentParser:
 
 def log() -> argparse.ArgumentParser:
     made = _parser('abs_log', 'Says what recordings hold (docs/telemetry.md)')
-    info = made.add_subparsers(dest='command', required=True, metavar='info').add_parser(
-        'info', help='format, runs, duration, channels, gaps, result', allow_abbrev=False)
-    info.add_argument('files', nargs='+', metavar='FILE', help="run folder, anybody's event log, CSV, MCAP or Parquet of a run")
-    info.add_argument('--json', action='store_true', help='print it as JSON: a list with an object for each file')
+    made.add_argument('what', choices=('info',), help='format, runs, duration, channels, gaps, result')
+    made.add_argument('files', nargs='+', metavar='FILE', help="run folder, anybody's event log, CSV, MCAP or Parquet of a run")
+    made.add_argument('--json', action='store_true', help='print it as JSON: a list with an object for each file')
     return made
 
 

@@ -20,10 +20,10 @@ WORK = {'report': ['{run}', '--out', '{out}/page.html', '--force', '--figures', 
         'learn': ['--generations', '1', '--figure', '{out}/curve.svg'], 'identify': ['{run}', '--out', '{out}/identified'],
         'benchmark': ['--quick', '--controller', 'pi', '--out', '{out}/page.html'], 'convert': ['{run}', '{out}/run.mcap'],
         'watch': ['--window', '10'], 'export-fmu': ['--out', '{out}/rig.fmu', '--force'], 'serve': ['{run}', '--port', '-1'],
-        'lab': ['--out', '{out}/lab.html'], 'rig': ['steady', '1', '--out', '{out}/rig.toml', '--force'], 'python_host': []}
+        'lab': ['--out', '{out}/lab.html'], 'log': ['info', '{run}'], 'rig': ['steady', '1', '--out', '{out}/rig.toml', '--force'], 'python_host': []}
 #: package -> programs that need it for this
-NEEDED = {'numpy': ('report', 'tune', 'learn', 'identify', 'benchmark', 'convert', 'serve', 'lab', 'rig'),
-          'pandas': ('report', 'identify', 'convert'), 'scipy': ('tune', 'identify'), 'matplotlib': ('report', 'learn'),
+NEEDED = {'numpy': ('report', 'tune', 'learn', 'identify', 'benchmark', 'convert', 'serve', 'lab', 'log', 'rig'),
+          'pandas': ('report', 'identify', 'convert', 'log'), 'scipy': ('tune', 'identify'), 'matplotlib': ('report', 'learn'),
           'jinja2': ('report', 'benchmark'), 'rich': ('watch',), 'aiohttp': ('serve',), 'mcap': ('convert',)}
 #: what packages of others raise that were built for, or ask for, another NumPy
 BROKEN = {'ValueError': "raise ValueError('numpy.dtype size changed, may indicate binary incompatibility. Expected 96, got 88')",

@@ -107,10 +107,8 @@ class Completion(unittest.TestCase):
         self.assertGreater(len(names), 20)
         below = [('abs_hil', 'study', word) for word in ('merge', 'status', 'submit')]
         others = [(file.name,) for file in sorted(FOLDER.glob('abs_*'))
-                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_guardian',
-                                       'abs_convert')]
-        of_abs_hil = [('abs_hil', name) for name in names if name != 'convert']
-        return [('abs_hil',), *of_abs_hil, *below, ('abs_guardian', 'serve'), *others]
+                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_guardian')]
+        return [('abs_hil',), *(('abs_hil', name) for name in names), *below, ('abs_guardian', 'serve'), *others]
 
     def help(self, words: tuple[str, ...]) -> str:
         return subprocess.run([FOLDER / words[0], *words[1:], '--help'], capture_output=True, text=True, check=True,
