@@ -2,8 +2,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "study/comparison.hpp"
 #include "study/parallel.hpp"
+#include "study/runs.hpp"
 
 namespace {
 
@@ -21,7 +21,13 @@ void thousand_runs(benchmark::State& state) {
                      .repeat = {.runs = 500, .seed = 3, .variation = Variation::standard()}},
                     {{.settings = settings_of("adaptive")}});
   const std::size_t threads = machine_threads();
-  for (auto _ : state) benchmark::DoNotOptimize(run_by_controller(study, threads));
+  std::vector<Outcome> outcomes(study.runs());
+  for (auto _ : state) {
+    run_part(
+        study, study.runs(), threads, [](std::size_t index) { return index; },
+        [&outcomes](std::size_t index, Outcome outcome) { outcomes[index] = std::move(outcome); });
+    benchmark::DoNotOptimize(outcomes.data());
+  }
   state.counters["threads"] = static_cast<double>(threads);
 }
 

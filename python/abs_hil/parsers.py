@@ -253,6 +253,10 @@ def rig() -> argparse.ArgumentParser:
     return made
 
 
+def compare_tables() -> argparse.ArgumentParser:
+    return _parser('abs_compare_tables', 'Makes the tables of abs_hil compare, which starts it (docs/comparison.md).')
+
+
 def python_host() -> argparse.ArgumentParser:
     return _parser('abs_python_host', 'Runs a controller in Python. abs_hil starts it, for --controller MODULE:CLASS '
                    '(docs/interchange.md).')

@@ -1,5 +1,6 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_log, abs_rig. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_log, abs_rig. `abs_hil report ...` starts them too. abs_hil
+itself starts abs_compare_tables and abs_python_host."""
 import codecs
 import contextlib
 import errno
@@ -8,6 +9,7 @@ import io
 import os
 import pathlib
 import sys
+import warnings
 from typing import Any
 
 from . import parsers
@@ -18,7 +20,8 @@ PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn':
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
-            'lab': 'abs_hil.lab.page', 'log': 'abs_hil.log', 'rig': 'abs_hil.rig', 'python_host': 'abs_hil.interchange.host'}
+            'lab': 'abs_hil.lab.page', 'log': 'abs_hil.log', 'rig': 'abs_hil.rig', 'compare_tables': 'abs_hil.compare',
+            'python_host': 'abs_hil.interchange.host'}
 
 
 #: for encodings without them
@@ -81,6 +84,8 @@ def version(name: str) -> str:
 def _start(name: str, arguments: list[str]) -> int:
     # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    if name == 'compare_tables':
+        warnings.simplefilter('ignore')  # a module older than the program does not matter: the program has made the runs
     said = io.StringIO()  # NumPy prints a page about packages that do not fit it
     try:
         if '--version' in arguments:

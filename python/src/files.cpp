@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -18,7 +19,6 @@
 #include "abs_hil/rig/signals.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "analysis/run_metrics.hpp"
-#include "analysis/statistics.hpp"
 #include "array.hpp"
 #include "bindings.hpp"
 #include "column_sink.hpp"
@@ -345,12 +345,11 @@ void add_files(py::module_& module) {
       py::arg("text"), py::arg("most_characters") = 200);
   module.def("is_signal_name", [](const std::string& name) { return rig::is_signal_name(name); });
   module.def(
-      "estimate_mean",
-      [](const std::vector<double>& values) {
-        const analysis::Estimate e = analysis::estimate_mean(values);
-        return py::make_tuple(e.n, e.mean, e.standard_deviation, e.low, e.high);
+      "student_quantile",
+      [](double probability, double degrees) {
+        return boost::math::quantile(boost::math::students_t(degrees), probability);
       },
-      py::arg("values"));
+      py::arg("probability"), py::arg("degrees"));
 }
 
 }  // namespace abs_hil::python

@@ -20,9 +20,11 @@ WORK = {'report': ['{run}', '--out', '{out}/page.html', '--force', '--figures', 
         'learn': ['--generations', '1', '--figure', '{out}/curve.svg'], 'identify': ['{run}', '--out', '{out}/identified'],
         'benchmark': ['--quick', '--controller', 'pi', '--out', '{out}/page.html'], 'convert': ['{run}', '{out}/run.mcap'],
         'watch': ['--window', '10'], 'export-fmu': ['--out', '{out}/rig.fmu', '--force'], 'serve': ['{run}', '--port', '-1'],
-        'lab': ['--out', '{out}/lab.html'], 'log': ['info', '{run}'], 'rig': ['steady', '1', '--out', '{out}/rig.toml', '--force'], 'python_host': []}
+        'lab': ['--out', '{out}/lab.html'], 'log': ['info', '{run}'], 'rig': ['steady', '1', '--out', '{out}/rig.toml', '--force'],
+        'python_host': [], 'compare_tables': []}
 #: package -> programs that need it for this
-NEEDED = {'numpy': ('report', 'tune', 'learn', 'identify', 'benchmark', 'convert', 'serve', 'lab', 'log', 'rig'),
+NEEDED = {'numpy': ('report', 'tune', 'learn', 'identify', 'benchmark', 'convert', 'serve', 'lab', 'log', 'rig',
+                    'compare_tables'),
           'pandas': ('report', 'identify', 'convert', 'log'), 'scipy': ('tune', 'identify'), 'matplotlib': ('report', 'learn'),
           'jinja2': ('report', 'benchmark'), 'rich': ('watch',), 'aiohttp': ('serve',), 'mcap': ('convert',)}
 #: what packages of others raise that were built for, or ask for, another NumPy

@@ -14,6 +14,7 @@ namespace abs_hil::driver {
 
 /// Starts a program in a session of its own, so that Ctrl-C ends this one alone, with default signals, empty input and
 /// output, and these descriptors only: those here by those there. Returns 0, or an errno.
+/// @param program  a path, or a name for the PATH
 inline int spawn(pid_t& pid, const std::string& program, std::initializer_list<std::pair<int, int>> files) {
   posix_spawn_file_actions_t actions{};
   posix_spawnattr_t attributes{};
@@ -36,7 +37,7 @@ inline int spawn(pid_t& pid, const std::string& program, std::initializer_list<s
   posix_spawn_file_actions_addclosefrom_np(&actions, greatest + 1);
   std::string name = program;
   std::array<char*, 2> arguments{name.data(), nullptr};
-  const int error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
+  const int error = ::posix_spawnp(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   return error;

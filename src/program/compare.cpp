@@ -1,21 +1,35 @@
-// `abs_hil compare`: a study of one case, whose runs are put side by side.
+// `abs_hil compare`: a study of one case. The tables of its rows are made by abs_compare_tables, in Python
+// (abs_hil/compare.py).
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <poll.h>
 #include <spdlog/spdlog.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 
+#include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
+#include "config/key_table.hpp"
+#include "config/model.hpp"
+#include "driver/spawn.hpp"
 #include "program/command_line.hpp"
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
-#include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
-#include "study/comparison.hpp"
+#include "study/compute.hpp"
 #include "study/parallel.hpp"
+#include "study/runs.hpp"
 
 namespace abs_hil::program {
 
@@ -37,16 +51,10 @@ struct CompareOptions {
 
 /// Of the table as a file.
 struct Format {
-  std::string_view option;
+  std::string_view option;  ///< behind its "--" the name of the text in the answer of abs_compare_tables
   std::string_view type;
-  std::string (*text)(const study::ComparisonTable& table, const std::string& config_json);
 };
-constexpr std::array<Format, 3> formats{
-    {{"--json", "FILE.json", &study::to_json},
-     {"--csv", "FILE.csv",
-      [](const study::ComparisonTable& table, const std::string&) { return study::to_csv(table); }},
-     {"--markdown", "FILE.md",
-      [](const study::ComparisonTable& table, const std::string&) { return study::to_markdown(table); }}}};
+constexpr std::array<Format, 3> formats{{{"--json", "FILE.json"}, {"--csv", "FILE.csv"}, {"--markdown", "FILE.md"}}};
 
 /// Refuses a file name that is a number: --repeat was meant.
 void refuse_number(const std::optional<std::string>& file) {
@@ -81,6 +89,120 @@ int record(const CompareOptions& options, const study::Study& study, const std::
   return status;
 }
 
+/// What the rows do not say of the comparison.
+nlohmann::ordered_json facts_of(const study::Study& study, const config::Configuration& merged) {
+  const study::RepeatScript& repeat = study.script().repeat;
+  auto controllers = nlohmann::ordered_json::array();
+  for (const study::Contender& contender : study.contenders(0)) {
+    controllers.push_back({{"name", contender.name},
+                           {"controller", contender.settings.control.controller},
+                           {"settings", contender.changes}});
+  }
+  return {{"repeat", repeat.runs},
+          {"seed", repeat.seed},
+          {"vary", repeat.variation.text()},
+          {"controllers", controllers},
+          {"model_differs", config::in_words(config::model_differences(merged.settings))},
+          {"config", nlohmann::ordered_json::parse(merged.json)}};
+}
+
+/// The plants that were drawn: the numbers that vary, by their keys, and the simulator's seed. Fields of a row.
+class DrawnPlants {
+ public:
+  explicit DrawnPlants(const study::Study& study)
+      : study_(study), runs_(study), settings_(study.cases().front().settings), keys_(settings_) {
+    const plant_sim::PlantOptions nominal = settings_.plant;
+    const plant_sim::PlantOptions least = perturbed(nominal, smallest(study.script().repeat.variation));
+    for (const config::Key& key : keys_.keys()) {
+      const auto* const* number = std::get_if<double*>(&key.target);
+      if (number == nullptr || !key.name.starts_with("plant.")) continue;
+      settings_.plant = nominal;
+      const double value = **number;
+      settings_.plant = least;
+      if (**number == value) continue;
+      numbers_.push_back(*number);
+      names_ += ',' + key.name;
+    }
+  }
+  [[nodiscard]] std::string names() const { return names_ + ",sensor_seed"; }
+  std::string values(std::uint64_t run) {
+    study::RunSettings::Drawn drawn = runs_.drawn(study_.index_of(run));
+    settings_.plant = std::move(drawn.plant);
+    std::string text;
+    for (const double* number : numbers_) text += fmt::format(",{}", *number);
+    return text + fmt::format(",{}", drawn.seed);
+  }
+
+ private:
+  const study::Study& study_;
+  study::RunSettings runs_;
+  config::Settings settings_;
+  config::KeyTable keys_;
+  std::vector<const double*> numbers_{};
+  std::string names_{};
+};
+
+/// abs_compare_tables. It loads its packages while the runs are computed, and says itself why it ends early.
+class TableMaker {
+ public:
+  TableMaker() {
+    std::array<int, 2> in{-1, -1};
+    std::array<int, 2> out{-1, -1};
+    const bool piped = ::pipe2(in.data(), O_CLOEXEC) == 0 && ::pipe2(out.data(), O_CLOEXEC) == 0;
+    const std::string program = python_program("compare_tables");
+    const int error = piped ? driver::spawn(pid_, program, {{in[0], STDIN_FILENO}, {out[1], STDOUT_FILENO}}) : errno;
+    ::close(in[0]);
+    ::close(out[1]);
+    to_ = ::fdopen(in[1], "w");
+    from_ = ::fdopen(out[0], "r");
+    if (error != 0) throw driver::Unavailable(no_python_program("compare_tables", error));
+  }
+  /// False if it has ended. Thread-safe.
+  [[nodiscard]] bool listens() const noexcept {
+    pollfd reader{.fd = ::fileno(to_), .events = 0, .revents = 0};
+    return ::poll(&reader, 1, 0) == 0;
+  }
+  void tell(const std::string& text) { std::fwrite(text.data(), 1, text.size(), to_); }
+  /// What it makes of all that it was told.
+  std::string answer() {
+    std::fclose(to_);
+    std::string text;
+    std::array<char, 65'536> block{};
+    while (const std::size_t read = std::fread(block.data(), 1, block.size(), from_)) text.append(block.data(), read);
+    return text;
+  }
+  /// Its exit status.
+  [[nodiscard]] int end() const {
+    int status = 0;
+    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (WIFEXITED(status)) return WEXITSTATUS(status);
+    throw std::runtime_error(
+        fmt::format("abs_compare_tables was ended by signal {}; repeat the comparison", WTERMSIG(status)));
+  }
+
+ private:
+  pid_t pid_{-1};
+  std::FILE* to_{nullptr};
+  std::FILE* from_{nullptr};
+};
+
+std::vector<study::Outcome> outcomes_of(const study::Study& study, std::size_t threads, const TableMaker& tables) {
+  std::vector<study::Outcome> outcomes(study.runs());
+  std::atomic<std::size_t> finished{0};
+  RunProgress progress;
+  run_part(
+      study, study.runs(), threads > 0 ? threads : study::machine_threads(), [](std::size_t index) { return index; },
+      [&](std::size_t index, study::Outcome outcome) {
+        if (!outcome.refusal.empty()) throw std::invalid_argument(outcome.refusal);
+        outcomes[index] = std::move(outcome);
+        const std::size_t done = ++finished;
+        if (!tables.listens()) throw Interrupted{done};
+        progress.show(done, study.runs());
+      });
+  return outcomes;
+}
+
 int compare_controllers(CompareOptions options, const std::vector<std::string>& command_line) {
   if (options.out && !options.recorded_run) {
     const auto ending = [](const Format& format) { return format.type.substr(std::string_view("FILE").size()); };
@@ -107,28 +229,37 @@ int compare_controllers(CompareOptions options, const std::vector<std::string>& 
        .path = "compare"},
       {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
   if (options.recorded_run) return record(options, study, command_line);
-  std::vector<std::unique_ptr<files::ResultFile>> tables;
-  for (const auto& file : options.table_files) tables.push_back(open_result(file, "comparison"));
-  const auto runs_file = open_result(options.runs_file, "comparison");
-
-  study::RunsByController runs;
+  std::vector<std::pair<const char*, std::unique_ptr<files::ResultFile>>> results;
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    if (options.table_files[i]) {
+      results.emplace_back(formats[i].option.data() + 2, open_result(options.table_files[i], "comparison"));
+    }
+  }
+  if (options.runs_file) results.emplace_back("runs", open_result(options.runs_file, "comparison"));
+  TableMaker tables;
+  std::vector<study::Outcome> outcomes;
   try {
-    RunProgress progress;
-    const std::size_t threads = options.threads > 0 ? options.threads : study::machine_threads();
-    runs = study::run_by_controller(study, threads, [&](std::size_t done) { progress.show(done, study.runs()); });
+    outcomes = outcomes_of(study, options.threads, tables);
   } catch (const Interrupted& interrupted) {
+    if (signalled() == rig::Reason::none) return tables.end();
     spdlog::warn(
         "interrupted after {} of {} runs. A comparison keeps nothing: repeat it, with fewer --repeat if it takes too "
         "long; `abs_hil study` can go on after an interruption (docs/studies.md)",
         interrupted.done, study.runs());
     return status_of(signalled());
   }
-  const study::ComparisonTable table = study::tabulate(study, runs);
-  for (std::size_t i = 0; i < tables.size(); ++i) {
-    if (tables[i]) tables[i]->write(formats[i].text(table, merged.json));
+  DrawnPlants plants(study);
+  tables.tell(facts_of(study, merged).dump() + '\n');
+  tables.tell(fmt::format("{}{}\n", fmt::join(study::result_columns(study.script()), ","), plants.names()));
+  for (std::uint64_t run = 0; run < study.runs(); ++run) {
+    const std::string row = study::result_row(study, run, outcomes[run], {});
+    tables.tell(row.substr(0, row.size() - 1) + plants.values(run) + '\n');
   }
-  if (runs_file) runs_file->write(study::runs_csv(study, runs));
-  cli::print(files::for_people(), "{}", study::to_text(table));
+  const std::string answer = tables.answer();
+  if (const int status = tables.end(); status != 0) return status;
+  const auto texts = nlohmann::json::parse(answer);
+  for (const auto& [kind, file] : results) file->write(texts.at(kind).get_ref<const std::string&>());
+  cli::print(files::for_people(), "{}", texts.at("text").get_ref<const std::string&>());
   return exit_completed;
 }
 

@@ -59,19 +59,27 @@ std::optional<int> start_python_program(int argc, char** argv) {
   if (!listed) return std::nullopt;
 
   const std::string file = fmt::format("abs_{}", name);
-  std::error_code error;
-  const std::string beside = (std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / file).string();
   std::vector<char*> arguments{const_cast<char*>(file.c_str())};  // exec changes none of them
   arguments.insert(arguments.end(), argv + 2, argv + argc);
   arguments.push_back(nullptr);
-  ::execv(beside.c_str(), arguments.data());
-  if (errno == ENOENT) ::execvp(file.c_str(), arguments.data());
-  const int why = errno;
-  const std::string cause = why == ENOENT ? "No such file or directory; install the package python3-abs-hil, or `pip "
-                                            "install .` in the source folder"
-                                          : rig::refusal(why, beside, rig::starting);
-  cli::print(stderr, "abs_hil: {}: {} (`abs_hil {}` is a program in Python)\n", beside, cause, name);
+  ::execvp(python_program(name).c_str(), arguments.data());
+  cli::print(stderr, "abs_hil: {}\n", no_python_program(name, errno));
   return exit_unavailable;
+}
+
+std::string python_program(std::string_view name) {
+  std::error_code error;
+  const std::filesystem::path beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  std::string file = fmt::format("abs_{}", name);
+  const std::filesystem::path path = beside / file;
+  return std::filesystem::exists(path, error) ? path.string() : file;
+}
+
+std::string no_python_program(std::string_view name, int error) {
+  const std::string cause = error == ENOENT ? "No such file or directory; install the package python3-abs-hil, or `pip "
+                                              "install .` in the source folder"
+                                            : rig::refusal(error, python_program(name), rig::starting);
+  return fmt::format("{}: {} (it is a program in Python)", python_program(name), cause);
 }
 
 }  // namespace abs_hil::program

@@ -42,6 +42,10 @@ struct Subcommand {
 /// If the first argument names a program in Python, it takes this process over with the other arguments. Returns the
 /// exit status if that fails, after a message that says what to install; nothing for any other first argument.
 [[nodiscard]] std::optional<int> start_python_program(int argc, char** argv);
+/// abs_NAME beside this program; elsewhere it is for the PATH to find.
+[[nodiscard]] std::string python_program(std::string_view name);
+/// Why it could not be started, and what to install. @param error  an errno
+[[nodiscard]] std::string no_python_program(std::string_view name, int error);
 
 Action add_list(cli::Parser& parser, const Words& words);
 Action add_doctor(cli::Parser& parser, const Words& words);

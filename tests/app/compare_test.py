@@ -1,8 +1,11 @@
 """abs_hil compare as users run it: the same table with any number of threads, consistent files, bad input refused."""
 import json
+import os
+import shutil
+import subprocess
 import unittest
 
-from program import ProgramTest
+from program import PROGRAM, ProgramTest
 
 SMALL = ('compare', '--controllers', 'adaptive,sliding-mode', '--repeat', '4', '--seed', '3')
 
@@ -86,6 +89,47 @@ class Compare(ProgramTest):
         result = self.run_program('--plant', 'paper-timing', 'compare', '--repeat', 1)
         self.assertEqual(result.returncode, 2)
         self.assertIn('--plant', result.stderr)
+
+    def with_tables_by(self, script, *args):
+        """The program in a folder of its own, beside a program of ours that should make the tables."""
+        folder = self.folder / 'bin'
+        folder.mkdir(exist_ok=True)
+        program = shutil.copy(PROGRAM, folder / 'abs_hil')
+        if script:
+            tables = folder / 'abs_compare_tables'
+            tables.write_text(f'#!/bin/sh\n{script}\n')
+            tables.chmod(0o755)
+        return subprocess.run([program, 'compare', '--controllers', 'pi', *args], capture_output=True, text=True, timeout=60,
+                              env={**os.environ, 'PATH': '/usr/bin:/bin'}, check=False)
+
+    def test_without_the_program_of_the_tables_nothing_runs(self):
+        out = self.folder / 'table.csv'
+        out.write_text('older')
+        result = self.with_tables_by('', '--repeat', '1000000', '--out', out)
+        self.assertEqual((result.returncode, result.stdout), (3, ''))
+        self.assertRegex(result.stderr, r'^abs_hil: abs_compare_tables: No such file.*; install the package python3-abs-hil.*\n$')
+        self.assertEqual(out.read_text(), 'older')
+
+    def test_tables_that_fail_end_the_runs(self):
+        """A million runs would take minutes."""
+        out = self.folder / 'table.csv'
+        result = self.with_tables_by('echo "abs_compare_tables: the Python package numpy is missing" >&2; exit 3', '--repeat', '1000000',
+                                     '--out', out)
+        self.assertEqual((result.returncode, result.stdout), (3, ''))
+        self.assertEqual(result.stderr, 'abs_compare_tables: the Python package numpy is missing\n')
+        result = self.with_tables_by('cat >/dev/null; kill -9 $$', '--repeat', '2', '--out', out)
+        self.assertEqual((result.returncode, result.stdout), (1, ''))
+        self.assertIn('abs_compare_tables was ended by signal 9', result.stderr)
+        self.assertEqual([path.name for path in self.folder.iterdir()], ['bin'])
+
+    def test_the_seed_of_a_run_is_told_where_the_phase_does_not_vary(self):
+        runs = self.folder / 'runs.csv'
+        self.run_program('compare', '--controllers', 'pi', '--repeat', 2, '--vary', 'theta=0.1', '--set', 'run.seed=7', '--runs', runs)
+        self.assertEqual([row['sensor_seed'] for row in self.rows(runs)], ['7', '7'])
+        summary = self.folder / 's.json'
+        self.fast('--controller', 'pi', '--set', 'experiment.start_speed_rad_s=170', '--seed', 7, '--set',
+                  f'plant.theta_N={self.rows(runs)[1]["plant.theta_N"]}', '--set', 'model.theta_N=23', '--summary', summary)
+        self.assertEqual(float(self.rows(runs)[1]['slip_rms']), self.summary(summary)['slip_rms'])
 
 
 if __name__ == '__main__':

@@ -107,7 +107,8 @@ class Completion(unittest.TestCase):
         self.assertGreater(len(names), 20)
         below = [('abs_hil', 'study', word) for word in ('merge', 'status', 'submit')]
         others = [(file.name,) for file in sorted(FOLDER.glob('abs_*'))
-                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_guardian')]
+                  if file.name not in ('abs_hil', 'abs_hil_program', 'abs_controller_host', 'abs_python_host', 'abs_compare_tables',
+                                       'abs_guardian')]
         return [('abs_hil',), *(('abs_hil', name) for name in names), *below, ('abs_guardian', 'serve'), *others]
 
     def help(self, words: tuple[str, ...]) -> str:

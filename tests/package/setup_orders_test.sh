@@ -61,7 +61,7 @@ check() {
   cat >"$root/tmp/check.sh" <<'CHECK'
 set -euo pipefail
 bin=$PWD/build/release/bin
-for program in "$bin"/abs_{report,tune,learn,identify,benchmark,convert,watch,export-fmu,serve,lab,rig,python_host}; do
+for program in "$bin"/abs_{report,compare_tables,tune,learn,identify,benchmark,convert,watch,export-fmu,serve,lab,rig,python_host}; do
   "$program" --help >/dev/null && "$program" --version >/dev/null
 done
 work=$(mktemp -d) && cd "$work"

@@ -6,7 +6,6 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "paper_plan.hpp"
-#include "study/comparison.hpp"
 #include "study/study_script.hpp"
 #include "temporary_folder.hpp"
 
@@ -85,25 +84,10 @@ TEST_CASE("bad contenders are refused with the entry, the key and the fix") {
 TEST_CASE("a variant with the default gain equals the plain controller, and another gain differs") {
   const Study study = paper_study({"adaptive", "same=adaptive{gamma=21}", "adaptive{gamma=80}"}, 3);
   REQUIRE(paper_settings().control.adaptive.gamma == 21.0);
-  const RunsByController runs = run_by_controller(study, 1);
-  const auto distance = [&](std::size_t c) { return runs[c][1].metrics.stop_distance_m; };
+  const std::vector<RunResult> runs = runs_of(study);
+  const auto distance = [&](std::size_t c) { return runs[3 + c].metrics.stop_distance_m; };
   CHECK(distance(1) == distance(0));
   CHECK(distance(2) != distance(0));
   CHECK(study.contenders(0)[2].name == "adaptive{gamma=80}");
   CHECK(study.contenders(0)[2].settings.control.controller == "adaptive");
-  CHECK_THAT(to_text(tabulate(study, runs)), Contains("same is adaptive with control.adaptive.gamma = 21.\n"));
-}
-
-TEST_CASE("the single runs come with the drawn plants") {
-  const Study study = paper_study({"adaptive{slip_ref=0.1,gamma=60}"}, 2, Variation::parse("theta=0.2"));
-  const std::string text = runs_csv(study, run_by_controller(study, 1));
-  const std::string header = text.substr(0, text.find('\n'));
-  CHECK_THAT(header, Catch::Matchers::EndsWith(",theta_error_final,plant.theta_N,sensor_seed"));
-  CHECK_THAT(text, Contains("\n\"adaptive{slip_ref=0.1,gamma=60}\",0,completed,"));
-  const double theta_N = paper_settings().plant.rig.tyre.theta_N *
-                         draw(study.script().repeat.variation, study.script().repeat.seed, 1).theta;
-  CHECK_THAT(text, Catch::Matchers::EndsWith(fmt::format(",{},1\n", theta_N)));
-  const Study varied = paper_study({"adaptive"}, 2);
-  CHECK_THAT(runs_csv(varied, run_by_controller(varied, 1)),
-             Contains("plant.J1_kg_m2") && Contains("plant.u0") && Contains("plant.B"));
 }

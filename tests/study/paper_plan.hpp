@@ -1,5 +1,6 @@
 #pragma once
 
+#include "study/runs.hpp"
 #include "study/study.hpp"
 
 namespace abs_hil::study::test {
@@ -19,6 +20,15 @@ inline Study paper_study(std::vector<std::string> controllers, std::uint64_t rep
            .repeat = {.runs = repeat, .seed = seed, .variation = variation},
            .path = "test"},
           {{.plant = settings.plant_name, .experiment = settings.experiment.name, .settings = settings}}};
+}
+
+/// The runs of a study, by their number.
+inline std::vector<RunResult> runs_of(const Study& study, std::size_t threads = 1) {
+  std::vector<RunResult> runs(study.runs());
+  run_part(
+      study, study.runs(), threads, [](std::size_t index) { return index; },
+      [&runs](std::size_t index, const Outcome& outcome) { runs[index] = outcome.run; });
+  return runs;
 }
 
 }  // namespace abs_hil::study::test

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core import _core
+from ..estimates import Estimate, of_mean
 from ..figures import FigureOfMerit, figures
 from .files import RunFiles, differing_keys
 from .model import Curve, Figure, Label, Panel, Style
@@ -62,11 +62,11 @@ def _values(metric: FigureOfMerit, group: Group, runs: list[RunFiles], surveys: 
 
 
 def _estimates(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey],
-               ) -> Iterator[tuple[FigureOfMerit, list[tuple[int, float, float, float, float]]]]:
+               ) -> Iterator[tuple[FigureOfMerit, list[Estimate]]]:
     """Each figure of merit with number, mean, standard deviation and 95 % interval of the mean of each group."""
     for metric in merits_shown():
         if metric.name != 'brake_start_s':
-            yield metric, [_core.estimate_mean(_values(metric, group, runs, surveys)) for group in found.groups]
+            yield metric, [of_mean(_values(metric, group, runs, surveys)) for group in found.groups]
 
 
 def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
@@ -103,7 +103,7 @@ def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys
         metric = figures()[key]
         values = [_values(metric, group, runs, surveys) for group in found.groups]
         every = [(place + beside, value) for place, some in zip(places, values) for value in some if math.isfinite(value)]
-        estimates = zip(places, map(_core.estimate_mean, values))
+        estimates = zip(places, map(of_mean, values))
         means = [(place, mean, low, high) for place, (n, mean, _, low, high) in estimates if n > 1]
         if not every:
             continue
