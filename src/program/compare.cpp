@@ -229,10 +229,10 @@ int compare_controllers(CompareOptions options, const std::vector<std::string>& 
        .path = "compare"},
       {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
   if (options.recorded_run) return record(options, study, command_line);
-  std::vector<std::pair<const char*, std::unique_ptr<files::ResultFile>>> results;
+  std::vector<std::pair<std::string, std::unique_ptr<files::ResultFile>>> results;
   for (std::size_t i = 0; i < formats.size(); ++i) {
     if (options.table_files[i]) {
-      results.emplace_back(formats[i].option.data() + 2, open_result(options.table_files[i], "comparison"));
+      results.emplace_back(formats[i].option.substr(2), open_result(options.table_files[i], "comparison"));
     }
   }
   if (options.runs_file) results.emplace_back("runs", open_result(options.runs_file, "comparison"));
