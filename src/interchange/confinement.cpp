@@ -2,10 +2,8 @@
 #include "interchange/confinement.hpp"
 
 #include <fcntl.h>
-#include <linux/audit.h>
 #include <linux/capability.h>
-#include <linux/filter.h>
-#include <linux/seccomp.h>
+#include <seccomp.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -16,67 +14,29 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstddef>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <span>
-#include <vector>
+#include <string_view>
 
 #include "interchange/host.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::interchange {
 
 namespace {
 
-struct SystemCall {
-  std::uint32_t number;
-  const char* name;
-};
-// NOLINTNEXTLINE(cppcoreguidelines-macro-usage)
-#define ABS_HIL_CALL(name) \
-  SystemCall { SYS_##name, #name }
-
 /// They end the code: a controller that asks for them wants something that it cannot have, and has to be told.
-constexpr std::array forbidden {
-#if defined(__x86_64__)
-  ABS_HIL_CALL(fork), ABS_HIL_CALL(vfork),
-#endif
-      ABS_HIL_CALL(execve), ABS_HIL_CALL(execveat), ABS_HIL_CALL(tkill), ABS_HIL_CALL(ptrace),
-      ABS_HIL_CALL(process_vm_readv), ABS_HIL_CALL(process_vm_writev), ABS_HIL_CALL(pidfd_send_signal),
-      ABS_HIL_CALL(sched_setscheduler), ABS_HIL_CALL(sched_setparam), ABS_HIL_CALL(sched_setattr),
-      ABS_HIL_CALL(setpriority), ABS_HIL_CALL(ioprio_set), ABS_HIL_CALL(unshare), ABS_HIL_CALL(setns),
-      ABS_HIL_CALL(mount), ABS_HIL_CALL(umount2), ABS_HIL_CALL(reboot)
-};
-/// They end the code for some of their arguments (below).
-constexpr std::array forbidden_in_part{ABS_HIL_CALL(clone),
-                                       ABS_HIL_CALL(kill),
-                                       ABS_HIL_CALL(tgkill),
-                                       ABS_HIL_CALL(rt_sigqueueinfo),
-                                       ABS_HIL_CALL(rt_tgsigqueueinfo),
-                                       ABS_HIL_CALL(prlimit64),
-                                       ABS_HIL_CALL(prctl),
-                                       ABS_HIL_CALL(fcntl),
-                                       ABS_HIL_CALL(ioctl)};
+constexpr std::string_view forbidden =
+    "fork vfork execve execveat tkill ptrace process_vm_readv process_vm_writev pidfd_send_signal sched_setscheduler "
+    "sched_setparam sched_setattr setpriority ioprio_set unshare setns mount umount2 reboot";
 /// They fail as they do on a system without them. Honest libraries try them and go on. They could reach around the
 /// limits, outlive the process, or change files that cannot be written.
-constexpr std::array absent {
-#if defined(__x86_64__)
-  ABS_HIL_CALL(chmod), ABS_HIL_CALL(chown), ABS_HIL_CALL(lchown),
-#endif
-      ABS_HIL_CALL(clone3), ABS_HIL_CALL(io_uring_setup), ABS_HIL_CALL(memfd_create), ABS_HIL_CALL(shmget),
-      ABS_HIL_CALL(msgget), ABS_HIL_CALL(semget), ABS_HIL_CALL(mq_open), ABS_HIL_CALL(bpf),
-      ABS_HIL_CALL(perf_event_open), ABS_HIL_CALL(pidfd_getfd), ABS_HIL_CALL(keyctl), ABS_HIL_CALL(add_key),
-      ABS_HIL_CALL(userfaultfd), ABS_HIL_CALL(fchmod), ABS_HIL_CALL(fchmodat), ABS_HIL_CALL(fchown),
-      ABS_HIL_CALL(fchownat), ABS_HIL_CALL(setxattr), ABS_HIL_CALL(lsetxattr), ABS_HIL_CALL(fsetxattr)
-};
-
-#undef ABS_HIL_CALL
-
-#if defined(__x86_64__)
-constexpr std::uint32_t this_architecture = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-constexpr std::uint32_t this_architecture = AUDIT_ARCH_AARCH64;
-#endif
+constexpr std::string_view absent =
+    "clone3 io_uring_setup memfd_create shmget msgget semget mq_open bpf perf_event_open pidfd_getfd keyctl add_key "
+    "userfaultfd chmod fchmod fchmodat chown lchown fchown fchownat setxattr lsetxattr fsetxattr";
 
 TrappedSystemCalls trapped;
 int answers_to = -1;
@@ -104,89 +64,55 @@ bool catch_traps(int socket) {
   return ::sigaction(SIGSYS, &action, nullptr) == 0;
 }
 
-constexpr std::uint32_t fails_with(std::uint32_t error) { return SECCOMP_RET_ERRNO | error; }
-
-/// A filter of system calls, statement by statement. Each statement leaves the call's number loaded.
+/// A filter of system calls (libseccomp). What calls by the numbers of another architecture is killed.
 class Filter {
  public:
-  Filter() { load(offsetof(seccomp_data, nr)); }
-
-  void give(std::uint32_t verdict) { code_.push_back(BPF_STMT(BPF_RET | BPF_K, verdict)); }
-  void give_for(std::uint32_t number, std::uint32_t verdict) {
-    jump(BPF_JEQ, number, 0, 1);
-    give(verdict);
+  explicit Filter(std::uint32_t otherwise) : context_(::seccomp_init(otherwise), ::seccomp_release) {
+    made_ = context_ && ::seccomp_attr_set(context_.get(), SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS) == 0;
   }
-  /// For this call, if its argument `n` (lower half) equals a value, or does not.
-  void give_if(std::uint32_t number, std::size_t n, std::uint32_t value, bool equal, std::uint32_t verdict) {
-    about(number, n, BPF_JEQ, value, equal, verdict);
+  /// For these calls, if an argument is as told. A call that this architecture lacks needs no rule.
+  void give(std::uint32_t verdict, std::string_view calls, std::span<const scmp_arg_cmp> argument = {}) {
+    for (const std::string_view call : rig::split(calls, ' ')) {
+      const int number = ::seccomp_syscall_resolve_name(std::string(call).c_str());
+      made_ = made_ && number != __NR_SCMP_ERROR &&
+              ::seccomp_rule_add_array(context_.get(), verdict, number, static_cast<unsigned>(argument.size()),
+                                       argument.data()) == 0;
+    }
   }
-  /// For this call, if these bits of its argument `n` are not set.
-  void give_without(std::uint32_t number, std::size_t n, std::uint32_t bits, std::uint32_t verdict) {
-    about(number, n, BPF_JSET, bits, false, verdict);
+  /// For these calls, if their argument `n`, of 32 bits, equals a value, or does not.
+  void give_if(std::uint32_t verdict, std::string_view calls, unsigned n, std::uint32_t value, bool equal = true) {
+    const auto is =
+        equal ? scmp_arg_cmp{n, SCMP_CMP_MASKED_EQ, ~std::uint32_t{0}, value} : scmp_arg_cmp{n, SCMP_CMP_NE, value, 0};
+    give(verdict, calls, {&is, 1});
   }
-  /// Kills what calls by the numbers of another architecture.
-  void insist_on_architecture() {
-    load(offsetof(seccomp_data, arch));
-    jump(BPF_JEQ, this_architecture, 1, 0);
-    give(SECCOMP_RET_KILL_PROCESS);
-    load(offsetof(seccomp_data, nr));
-#if defined(__x86_64__)
-    constexpr std::uint32_t x32 = 0x4000'0000U;
-    jump(BPF_JGE, x32, 0, 1);
-    give(SECCOMP_RET_KILL_PROCESS);
-#endif
-  }
-  [[nodiscard]] bool install() {
-    const sock_fprog program{.len = static_cast<unsigned short>(code_.size()), .filter = code_.data()};
-    return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
-           ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program, 0, 0) == 0;
-  }
+  [[nodiscard]] bool install() { return made_ && ::seccomp_load(context_.get()) == 0; }
 
  private:
-  void load(std::size_t offset) {
-    code_.push_back(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset)));
-  }
-  void jump(unsigned kind, std::uint32_t value, std::uint8_t if_true, std::uint8_t if_false) {
-    code_.push_back(BPF_JUMP(static_cast<std::uint16_t>(BPF_JMP | kind | BPF_K), value, if_true, if_false));
-  }
-  void about(std::uint32_t number, std::size_t n, unsigned kind, std::uint32_t value, bool holds,
-             std::uint32_t verdict) {
-    jump(BPF_JEQ, number, 0, 4);
-    load(offsetof(seccomp_data, args) + n * sizeof(std::uint64_t));
-    jump(kind, value, holds ? 0 : 1, holds ? 1 : 0);
-    give(verdict);
-    load(offsetof(seccomp_data, nr));
-  }
-
-  std::vector<sock_filter> code_{};
+  std::unique_ptr<void, void (*)(void*)> context_;
+  bool made_{false};
 };
 
 bool filter_calls() {
   const auto own = static_cast<std::uint32_t>(::getpid());
-  constexpr std::uint32_t thread = 0x0001'0000;  // CLONE_THREAD
+  constexpr std::uint64_t thread = 0x0001'0000;  // CLONE_THREAD
   constexpr std::uint32_t set_owner = 0x8901;    // FIOSETOWN
   constexpr std::uint32_t set_group = 0x8902;    // SIOCSPGRP
-  constexpr std::uint32_t ends = SECCOMP_RET_TRAP;
-  Filter filter;
-  filter.insist_on_architecture();
-  for (const SystemCall& call : forbidden) filter.give_for(call.number, ends);
-  for (const SystemCall& call : absent) filter.give_for(call.number, fails_with(ENOSYS));
-  filter.give_without(SYS_clone, 0, thread, ends);
+  constexpr std::uint32_t ends = SCMP_ACT_TRAP;
+  Filter filter(SCMP_ACT_ALLOW);
+  filter.give(ends, forbidden);
+  filter.give(SCMP_ACT_ERRNO(ENOSYS), absent);
+  const scmp_arg_cmp no_thread{0, SCMP_CMP_MASKED_EQ, thread, 0};
+  filter.give(ends, "clone", {&no_thread, 1});
   // Honest libraries ask whether there is a network (Python's), or local services for names of users (the C library's).
-  filter.give_for(SYS_socket, fails_with(EACCES));
-  for (const int call : {SYS_kill, SYS_tgkill, SYS_rt_sigqueueinfo, SYS_rt_tgsigqueueinfo}) {
-    filter.give_if(static_cast<std::uint32_t>(call), 0, own, false, ends);
-  }
-  filter.give_if(SYS_prlimit64, 0, 0, false, ends);
-  filter.give_if(SYS_sched_setaffinity, 0, 0, false, fails_with(EPERM));
-  filter.give_if(SYS_prctl, 0, PR_SET_PDEATHSIG, true, ends);
-  filter.give_if(SYS_rt_sigaction, 0, SIGSYS, true, fails_with(EPERM));
+  filter.give(SCMP_ACT_ERRNO(EACCES), "socket");
+  filter.give_if(ends, "kill tgkill rt_sigqueueinfo rt_tgsigqueueinfo", 0, own, false);
+  filter.give_if(ends, "prlimit64", 0, 0, false);
+  filter.give_if(SCMP_ACT_ERRNO(EPERM), "sched_setaffinity", 0, 0, false);
+  filter.give_if(ends, "prctl", 0, PR_SET_PDEATHSIG);
+  filter.give_if(SCMP_ACT_ERRNO(EPERM), "rt_sigaction", 0, SIGSYS);
   // Signals to the owner of a descriptor would reach other processes.
-  for (const int command : {F_SETOWN, F_SETSIG, F_SETOWN_EX}) {
-    filter.give_if(SYS_fcntl, 1, static_cast<std::uint32_t>(command), true, ends);
-  }
-  for (const std::uint32_t command : {set_owner, set_group}) filter.give_if(SYS_ioctl, 1, command, true, ends);
-  filter.give(SECCOMP_RET_ALLOW);
+  for (const std::uint32_t command : {F_SETOWN, F_SETSIG, F_SETOWN_EX}) filter.give_if(ends, "fcntl", 1, command);
+  for (const std::uint32_t command : {set_owner, set_group}) filter.give_if(ends, "ioctl", 1, command);
   return filter.install();
 }
 
@@ -272,25 +198,19 @@ std::string confine(int socket) {
   return {};
 }
 
-const char* name_of_forbidden(std::int32_t number) noexcept {
-  for (const std::span<const SystemCall> calls : {std::span<const SystemCall>(forbidden), {forbidden_in_part}}) {
-    for (const SystemCall& call : calls) {
-      if (call.number == static_cast<std::uint32_t>(number)) return call.name;
-    }
-  }
-  return "another one";
+std::string name_of_call(std::int32_t number) {
+  const std::unique_ptr<char, void (*)(void*)> name(::seccomp_syscall_resolve_num_arch(SCMP_ARCH_NATIVE, number),
+                                                    std::free);
+  return name ? name.get() : "another one";
 }
 
 bool trap_system_calls(int socket) {
   counting = true;
   if (answers_to < 0 && !catch_traps(socket)) return false;
-  Filter filter;
+  Filter filter(SCMP_ACT_TRAP);
   // The C library asks for memory by some of these; what the code allocates is counted elsewhere.
-  for (const int call : {SYS_exit_group, SYS_rt_sigreturn, SYS_brk, SYS_mmap, SYS_munmap}) {
-    filter.give_for(static_cast<std::uint32_t>(call), SECCOMP_RET_ALLOW);
-  }
-  filter.give_if(SYS_sendto, 0, static_cast<std::uint32_t>(socket), true, SECCOMP_RET_ALLOW);
-  filter.give(SECCOMP_RET_TRAP);
+  filter.give(SCMP_ACT_ALLOW, "exit_group rt_sigreturn brk mmap munmap");
+  filter.give_if(SCMP_ACT_ALLOW, "sendto", 0, static_cast<std::uint32_t>(socket));
   return filter.install();
 }
 

@@ -20,8 +20,8 @@ inline constexpr std::uint64_t host_threads_max = 256;                          
 /// Returns why the kernel cannot do that; empty if it can.
 [[nodiscard]] std::string confine(int socket);
 
-/// Name of a system call that ends confined code; "another one" for those that do not.
-[[nodiscard]] const char* name_of_forbidden(std::int32_t number) noexcept;
+/// Name of a system call; "another one" for a number that is none.
+[[nodiscard]] std::string name_of_call(std::int32_t number);
 
 struct TrappedSystemCalls {
   std::uint64_t count{0};

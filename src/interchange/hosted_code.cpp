@@ -179,7 +179,7 @@ std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
     std::memcpy(&refusal, answer, sizeof refusal);
     end();
     return fmt::format("was ended: it asked for the system call {} ({}); {}", refusal.system_call,
-                       name_of_forbidden(refusal.system_call), not_allowed);
+                       name_of_call(refusal.system_call), not_allowed);
   }
   if (got != 0) {
     const bool threads = too_many_threads();

@@ -53,7 +53,9 @@ TEST_CASE("the loader's words name the cause and the fix") {
   std::ifstream self("/proc/self/exe", std::ios::binary);
   std::string head(4096, '\0');
   self.read(head.data(), 4096);
-  REQUIRE(head.substr(0, 4) == "\x7f" "ELF");
+  REQUIRE(head.substr(0, 4) ==
+          "\x7f"
+          "ELF");
   constexpr std::size_t class_at = 4;
   constexpr std::size_t machine_at = 18;
   std::string bits32 = head;

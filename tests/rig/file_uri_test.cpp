@@ -14,15 +14,16 @@ TEST_CASE("every byte of a path survives the way through its URI") {
   const std::string uri = file_uri(all);
   CHECK(path_of_uri(uri, false) == all);
   CHECK(uri.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~/%:") == uri.npos);
-  for (const char* path : {"/", "/tmp/50% of it", "/a%41b", "/a b", "/x:/resources", "/über/制动", "/a#b?c&d", "//a", "/%"}) {
+  for (const char* path :
+       {"/", "/tmp/50% of it", "/a%41b", "/a b", "/x:/resources", "/über/制动", "/a#b?c&d", "//a", "/%"}) {
     CHECK(path_of_uri(file_uri(path), false) == path);
   }
   CHECK(file_uri("/tmp/50% of it") == "file:///tmp/50%25%20of%20it");
 }
 
 TEST_CASE("all forms of an URI name the same file") {
-  for (const char* uri : {"file:///tmp/a%20b", "file:/tmp/a%20b", "file://localhost/tmp/a%20b", "FILE://LocalHost/tmp/a%20b",
-                          "file:///tmp/a b", "/tmp/a b", "file:///%74mp/a%20b"}) {
+  for (const char* uri : {"file:///tmp/a%20b", "file:/tmp/a%20b", "file://localhost/tmp/a%20b",
+                          "FILE://LocalHost/tmp/a%20b", "file:///tmp/a b", "/tmp/a b", "file:///%74mp/a%20b"}) {
     CHECK(path_of_uri(uri, false) == "/tmp/a b");
   }
   CHECK(path_of_uri("/tmp/a%20b", false) == "/tmp/a%20b");  // a path, as of FMI 3
@@ -37,7 +38,8 @@ TEST_CASE("all forms of an URI name the same file") {
 }
 
 TEST_CASE("Windows has drives and other computers") {
-  for (const char* uri : {"file:///C:/a%20b", "file:/C:/a%20b", "file://localhost/C:/a%20b", "file:///C%3A/a b", "file:///C|/a b"}) {
+  for (const char* uri :
+       {"file:///C:/a%20b", "file:/C:/a%20b", "file://localhost/C:/a%20b", "file:///C%3A/a b", "file:///C|/a b"}) {
     CHECK(path_of_uri(uri, true) == "C:/a b");
   }
   CHECK(path_of_uri("C:\\a b", true) == "C:\\a b");

@@ -110,7 +110,8 @@ TEST_CASE("names of folders keep their letters") {
   CHECK(name("..") == "unnamed");
   CHECK(name("") == "unnamed");
   CHECK(name("🚗") == "unnamed");
-  CHECK(name("\xff\xfe" "abc") == "c");  // no UTF-8
+  CHECK(name("\xff\xfe"
+             "abc") == "c");  // no UTF-8
   CHECK(name("\u202Ea\u200Bb") == "a-b");
 }
 
