@@ -36,8 +36,10 @@ echo "== $(date '+%Y-%m-%d %H:%M:%S') $list: ${missing[*]}" >>"$log"
 status=0
 install_missing >>"$log" 2>&1 || status=$?
 if [ $status -eq 0 ]; then
-  # What build/python got from PyPI may stand before a package that is new now.
-  if [ "${ABS_HIL_SETUP:-}" != python ] && [[ " ${missing[*]}" == *" python3-"* ]]; then "$here/setup_python.sh" --again || true; fi
+  # What build/python got from PyPI may stand before a package that is new now. Its owner's next call looks after it otherwise.
+  if [ "${ABS_HIL_SETUP:-}" != python ] && [[ " ${missing[*]}" == *" python3-"* ]] && [ -O "$here/../build/python" ]; then
+    "$here/setup_python.sh" --again || true
+  fi
   exit 0
 fi
 tail -n 20 "$log" >&2

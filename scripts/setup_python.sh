@@ -11,7 +11,7 @@ cd "$(dirname "$(realpath "$0")")/.."
 
 environment=build/python
 declare -A lists=()
-for stamp in "$environment"/python-packages*.txt; do [ ! -e "$stamp" ] || lists[${stamp##*/}]=1; done
+for stamp in "$environment"/python-packages*.txt; do [ ! -e "scripts/${stamp##*/}" ] || lists[${stamp##*/}]=1; done
 if [ "${1:-}" = --again ]; then
   [ ${#lists[@]} -gt 0 ] || exit 0
 else
@@ -20,16 +20,16 @@ fi
 requirements=("${!lists[@]}")
 for list in "${requirements[@]}"; do [ -e "scripts/$list" ] || { echo "setup: there is no scripts/$list" >&2; exit 2; }; done
 python=/usr/bin/python3
-[ -x "$python" ] || python=python3
+[ -x "$python" ] || python=$(command -v python3) || { echo "setup: there is no python3: scripts/setup.sh installs it" >&2; exit 3; }
 
 mkdir -p build
 exec 9>build/python.lock
 ! command -v flock >/dev/null || flock 9
 # What the environment was made from; a stamp for each list holds it.
 state() {
-  { cat scripts/python_environment.py "${requirements[@]/#/scripts/}"; "$python" -VV
+  { pwd; cat scripts/python_environment.py "${requirements[@]/#/scripts/}"; "$python" -VV
     dpkg-query -W -f='${Package} ${Version}\n' 'python3*' || true
-    ls "$environment"/lib/python*/site-packages || true; } 2>/dev/null | sha256sum
+    ls -d "$environment"/lib/python*/site-packages/*-info || true; } 2>/dev/null | sha256sum
 }
 current=$(state)
 for list in "${requirements[@]}"; do
@@ -52,7 +52,7 @@ problems() { "$environment/bin/python" -W ignore scripts/python_environment.py p
 make_it() {
   if [ "$1" != keep ]; then
     [ -e "$environment.old" ] || [ ! -e "$environment" ] || mv "$environment" "$environment.old"
-    "$python" -m venv --clear --system-site-packages "$environment" || give_up "install python3-venv: scripts/setup.sh does" 3
+    "$python" -m venv --clear --system-site-packages "$environment" || give_up "python3-venv is missing: scripts/setup.sh installs it" 3
   fi
   "$python" scripts/python_environment.py constraints >"$environment/constraints.txt"
   # For every pip in this environment, also one that a user starts.
@@ -60,21 +60,22 @@ make_it() {
   [ "$1" != keep ] || problems || return 1
   local more=()
   [ "$1" != whole ] || more=(-r "$environment/constraints.txt")
-  "$environment/bin/python" -m pip install --quiet --disable-pip-version-check "${requirements[@]/#/-rscripts/}" "${more[@]}" ||
-    give_up "pip failed, see above" 1
+  PIP_USER=0 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check -c "$environment/constraints.txt" \
+    "${requirements[@]/#/-rscripts/}" "${more[@]}" || give_up "pip failed, see above" 1
   problems
 }
 give_up() {
-  [ ! -e "$environment.old" ] || { rm -rf "$environment"; mv "$environment.old" "$environment"; }
+  [ $way = keep ] || rm -rf "$environment"
+  [ ! -e "$environment.old" ] || mv "$environment.old" "$environment"
   echo "setup: $environment is not made: $1" >&2
   exit "$2"
 }
 
-rm -rf "$environment.old"
+[ ! -e "$environment.old" ] || { rm -rf "$environment"; mv "$environment.old" "$environment"; }  # interrupted before
 version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 way=anew
 if [ -x "$environment/bin/python" ] && [ -d "$environment/lib/python$version/site-packages/pip" ] &&
-  grep -q '^include-system-site-packages = true' "$environment/pyvenv.cfg"; then
+  grep -q '^include-system-site-packages = true' "$environment/pyvenv.cfg" && grep -qF "$PWD/$environment/" "$environment/bin/pip"; then
   way=keep
 fi
 until make_it $way; do
