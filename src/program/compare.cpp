@@ -80,7 +80,7 @@ int record(const CompareOptions& options, const study::Study& study, const std::
     std::optional<std::string> folder = options.out;
     if (folder && contenders.size() > 1) {
       constexpr std::size_t number_bytes = 12;
-      std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes, '_');
+      std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes);
       while (!names.insert(name).second) name += fmt::format("-{}", c + 1);
       *folder += '/' + name;
     }

@@ -53,7 +53,7 @@ std::string in_ascii(char32_t code, std::string_view bytes) {
 
 }  // namespace
 
-std::string folder_name(std::string_view text, const fs::path& parent, std::size_t spare_bytes, char odd) {
+std::string folder_name(std::string_view text, const fs::path& parent, std::size_t spare_bytes) {
   std::string name;
   for (std::size_t size = 0; !text.empty(); text.remove_prefix(size)) {
     const auto first = static_cast<unsigned char>(text.front());
@@ -63,8 +63,8 @@ std::string folder_name(std::string_view text, const fs::path& parent, std::size
     const std::string piece = in_ascii(code, text.substr(0, size));
     if (piece != "-") {
       name += piece;
-    } else if (odd != '-' || (!name.empty() && name.back() != odd)) {
-      name += odd;
+    } else if (!name.empty() && name.back() != '-') {
+      name += '-';
     }
   }
   std::size_t most = 255;

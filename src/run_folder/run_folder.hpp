@@ -77,10 +77,10 @@ struct RunEnvironment {
 [[nodiscard]] std::filesystem::path default_runs_dir();
 
 /// The text as a name of a folder below `parent`: letters and digits of ASCII, `_=.` and letters of scripts that have
-/// no form in ASCII here. Marks go (a for an umlaut), other characters become `odd`, dashes one for several, and the
-/// end is cut to what the file system allows less `spare_bytes`. Two texts may have the same name. Never empty.
+/// no form in ASCII here. Marks go (a for an umlaut), other characters become dashes, one for several, and the end is
+/// cut to what the file system allows less `spare_bytes`. Two texts may have the same name. Never empty.
 [[nodiscard]] std::string folder_name(std::string_view text, const std::filesystem::path& parent,
-                                      std::size_t spare_bytes = 0, char odd = '-');
+                                      std::size_t spare_bytes = 0);
 
 /// Makes a folder below `parent`: `20261121-134512-paper`, with -2, -3, ... if that is taken. RunFolder says why if it
 /// could not.

@@ -254,7 +254,7 @@ plant.theta_N = {{ from = 15, to = 30 }}
             self.assert_refused(result, words)
             self.assertFalse((self.folder / 'bad').exists())
         self.study.write_text(STUDY)
-        for args, words in ((('study', self.folder / 'none.toml'), ['none.toml', 'No such file']),
+        for args, words in ((('study', self.folder / 'none.toml'), ['none.toml', 'no such file', 'give a study']),
                             (('study',), ['merge, status or submit']),
                             (('study', self.study), ['--out']),
                             (('study', self.study, '--out', 'x', '--shard', '3/2'), ['--shard 3/2']),
