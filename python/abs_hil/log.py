@@ -6,22 +6,21 @@ import json
 import os
 import pathlib
 import struct
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from . import parsers
 from .core import _core
-from .interchange.mcap_file import mcap_file
+from .interchange.mcap_file import McapContent
 from .interchange.recorded import missing_rows
 from .messages import TYPES
 from .options import failed
 from .recording import FOLDER, LOG, MCAP, kind_of, load, missing_in, named, run_names
 from .run import Run
 
-#: where the times of a log of virtual time begin (src/program/run_outputs.cpp)
-VIRTUAL_EPOCH_NS = 946_684_800 * 10 ** 9
+#: where the times of a log of virtual time begin (src/program/run_outputs.cpp), and of those that are not known
+EPOCHS_NS, DAY_NS = (946_684_800 * 10 ** 9, 0), 86_400 * 10 ** 9
 _TYPES = {type_._get_packed_fingerprint(): name for name, type_ in TYPES.items()}
 #: where the number of a message stands in its bytes
 _SEQUENCE = 16
@@ -47,17 +46,16 @@ def info_of(name: str) -> dict[str, Any]:
     files = [place] if kind != FOLDER else [one for one in place.iterdir() if one.is_file()]
     told: dict[str, Any] = {'file': name, 'format': kind, 'bytes': sum(one.stat().st_size for one in files), 'start_utc': None,
                             'duration_s': None, 'parts': 1, 'damage': None, 'channels': [], 'runs': []}
-    names = [name]
     if kind == LOG or (place / 'run.lcmlog').is_file():
         runs = _take_log(place if kind == LOG else place / 'run.lcmlog', told)
-        names = [f'{place}#{one}' for one in range(1, runs + 1)] if kind == LOG and not number and runs != 1 else names
+        names = [f'{place}#{one}' for one in range(1, runs + 1)] if kind == LOG and not number and runs != 1 else [name]
     elif kind == MCAP:
-        content = mcap_file(place)
+        content = McapContent(place)
         told['damage'] = content.damage or None
-        for topic in content.topics.values():
-            _take_channel(told, topic.name, topic.type, topic.times_ns, topic.bytes)
-        names = run_names(name) if any(topic.data for topic in content.topics.values()) else []
-    elif kind != FOLDER:
+        told['channels'] = [_channel(one.name, one.type, {0: [(time_ns, 0, 0) for time_ns in one.times_ns]}, one.bytes)
+                            for one in content.topics.values() if one.times_ns]
+        names = run_names(name) if any(one.columns and one.data for one in content.topics.values()) else []
+    else:
         names = run_names(name)
     for one in names:
         try:
@@ -66,7 +64,7 @@ def info_of(name: str) -> dict[str, Any]:
             if not told['channels']:
                 raise
             told['runs'].append({'name': one, 'rows': 0, 'notes': [str(error)]})
-    spans = [(one['start_ns'], one['end_ns']) for one in (told['channels'] or told['runs']) if 'end_ns' in one]
+    spans = [one['span_ns'] for one in (told['channels'] or told['runs']) if 'span_ns' in one]
     if spans:
         begin, end = min(begin for begin, _ in spans), max(end for _, end in spans)
         told.update(start_utc=_date(begin), duration_s=(end - begin) * 1e-9)
@@ -81,7 +79,7 @@ def _take_log(place: pathlib.Path, told: dict[str, Any]) -> int:
         for run, part, _, time_us, channel, data in events:
             type_ = _TYPES.get(data[:8], '')
             sequence = struct.unpack_from('>q', data, _SEQUENCE)[0] if type_ and len(data) >= _SEQUENCE + 8 else 0
-            channels.setdefault((channel, type_), {}).setdefault(run, []).append((time_us, len(data), sequence))
+            channels.setdefault((channel, type_), {}).setdefault(run, []).append((time_us * 1000, len(data), sequence))
             runs = max(runs, run + 1) if type_ in ('telemetry_t', 'experiment_t') else runs
             told['parts'] = part + 1
         told['damage'] = events.cut or None
@@ -89,30 +87,25 @@ def _take_log(place: pathlib.Path, told: dict[str, Any]) -> int:
         if not channels:
             raise
         told['damage'] = str(error)
-    for (channel, type_), by_run in channels.items():
-        tables = [np.array(one) for one in by_run.values()]
-        lost = sum(missing_in(np.clip(one[:, 2], 0, 2 ** 53)) for one in tables) if type_ not in ('', 'command_t') else None
-        _take_channel(told, channel, type_, np.concatenate(tables)[:, 0] * 1000, sum(int(one[:, 1].sum()) for one in tables), lost,
-                      sum(float(np.ptp(one[:, 0])) for one in tables) * 1e-6, len(tables))
+    told['channels'] = [_channel(*key, by_run) for key, by_run in channels.items()]
     return runs
 
 
-def _take_channel(told: dict[str, Any], name: str, type_: str, times_ns: Sequence[int] | np.ndarray, size: int,
-                  lost: int | None = None, span_s: float | None = None, runs: int = 1) -> None:
-    if len(times_ns) == 0:
-        return
-    begin, end = int(min(times_ns)), int(max(times_ns))
-    span_s = (end - begin) * 1e-9 if span_s is None else span_s
-    told['channels'].append({'channel': name, 'type': type_ or None, 'messages': len(times_ns), 'bytes': size, 'lost': lost,
-                             'rate_Hz': (len(times_ns) - runs) / span_s if span_s > 0 else None, 'start_ns': begin, 'end_ns': end})
+def _channel(name: str, type_: str, by_run: dict[int, list[tuple[int, int, int]]], size: int | None = None) -> dict[str, Any]:
+    """By run: time in ns, size and number of each message."""
+    tables = [np.array(one, dtype=np.int64) for one in by_run.values()]
+    count, span_s = sum(map(len, tables)), sum(int(np.ptp(one[:, 0])) for one in tables) * 1e-9
+    lost = sum(missing_in(np.clip(one[:, 2], 0, 2 ** 53)) for one in tables) if type_ in TYPES and type_ != 'command_t' else None
+    return {'channel': name, 'type': type_ or None, 'messages': count, 'lost': lost,
+            'bytes': sum(int(one[:, 1].sum()) for one in tables) if size is None else size,
+            'rate_Hz': (count - len(tables)) / span_s if span_s > 0 else None,
+            'span_ns': [min(int(one[:, 0].min()) for one in tables), max(int(one[:, 0].max()) for one in tables)]}
 
 
 def _date(time_ns: int) -> str | None:
-    """Nothing for times that are no dates: of virtual time, and unknown ones."""
-    if time_ns < 86_400 * 10 ** 9 or abs(time_ns - VIRTUAL_EPOCH_NS) < 86_400 * 10 ** 9:
-        return None
-    with contextlib.suppress(OverflowError, ValueError, OSError):
-        return datetime.datetime.fromtimestamp(time_ns * 1e-9, datetime.UTC).isoformat(timespec='milliseconds')
+    if not any(abs(time_ns - epoch_ns) < DAY_NS for epoch_ns in EPOCHS_NS):
+        with contextlib.suppress(OverflowError, ValueError, OSError):
+            return datetime.datetime.fromtimestamp(time_ns * 1e-9, datetime.UTC).isoformat(timespec='milliseconds')
     return None
 
 
@@ -123,23 +116,25 @@ def _of_run(name: str, run: Run) -> dict[str, Any]:
             **{key: run.summary.get(key) for key in _FACTS}, 'signals': list(run.signals),
             'phases': [phase for phase, _ in itertools.groupby(run['phase'].tolist())],
             'gaps': list(dict.fromkeys([*run.losses, *missing_rows(run)])), 'notes': run.notes,
-            'start_ns': run.start_ns + round(begin_s * 1e9), 'end_ns': run.start_ns + round(end_s * 1e9)}
+            'span_ns': [run.start_ns + round(time_s * 1e9) for time_s in (begin_s, end_s)]}
 
 
 def _text(told: dict[str, Any]) -> str:
-    lines = [('file', told['file']), ('format', f'{told["format"]}, {_bytes(told["bytes"])}'
-                                      + f', {told["parts"]} recordings, one appended to the other' * (told['parts'] > 1)),
-             ('start', told['start_utc'] or 'no date: virtual time, or not recorded'), ('duration', f'{told["duration_s"] or 0:.3f} s'),
-             ('whole', f'no: {told["damage"]}' if told['damage'] else 'yes')]
+    parts = f', {told["parts"]} recordings, one appended to the other' * (told['parts'] > 1)
+    lines = [('file', told['file']), ('format', f'{told["format"]}, {_bytes(told["bytes"])}{parts}'),
+             ('start', told['start_utc'] or 'no date: virtual time, or not recorded'),
+             ('duration', f'{told["duration_s"] or 0:.3f} s'), ('whole', f'no: {told["damage"]}' if told['damage'] else 'yes')]
     for one in told['channels']:
-        rate, lost = (f'{value}' if value is not None else '' for value in (one['rate_Hz'] and f'{one["rate_Hz"]:.1f} Hz', one['lost']))
-        lines.append(('channel', f'{one["channel"]:<20} {one["type"] or "unknown type":<16} {one["messages"]:>8} messages {rate:>10} '
-                      f'{_bytes(one["bytes"]):>9}{"  lost " * bool(lost)}{lost}'))
+        rate = '' if one['rate_Hz'] is None else f'{one["rate_Hz"]:.1f} Hz'
+        lost = '' if one['lost'] is None else f'  lost {one["lost"]}'
+        lines.append(('channel', f'{one["channel"]:<20} {one["type"] or "unknown type":<16} {one["messages"]:>8} messages '
+                      f'{rate:>10} {_bytes(one["bytes"]):>9}{lost}'))
     for run in told['runs'] or [{'name': 'none of abs_hil', 'rows': 0, 'notes': []}]:
-        who = ', '.join(str(run[key]) for key in _FACTS[:4] if run.get(key))
-        lines.append(('run', run['name'] + ': ' * bool(who) + who))
+        names = ', '.join(str(run[key]) for key in _FACTS[:4] if run.get(key))
+        lines.append(('run', ': '.join(filter(None, [run['name'], names]))))
         if run['rows']:
-            lines += [('', f'{run["rows"]} rows, {run["duration_s"]:.3f} s, {run["start_utc"] or "no date"}; {" ".join(run["phases"])}'),
+            when = run['start_utc'] or 'no date'
+            lines += [('', f'{run["rows"]} rows, {run["duration_s"]:.3f} s, {when}; {" ".join(run["phases"])}'),
                       ('', ': '.join(filter(None, [run['result'] or 'result unknown', run['reason']])))]
         lines += [('', note) for note in [*run.get('gaps', ()), *run['notes']]]
     return '\n'.join(f'{title + ":" * bool(title):<10}{text}' for title, text in lines)

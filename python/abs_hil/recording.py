@@ -8,7 +8,6 @@ import gzip
 import math
 import os
 import pathlib
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +15,8 @@ import numpy as np
 
 from .core import _core
 from .figures import figures, figures_of
-from .interchange.mcap_file import mcap_file
+from .interchange.mcap_file import EVENT_TOPIC, McapContent
+from .interchange.messages import log_of
 from .messages import PHASES, REASONS, decode
 from .nesting import parse_json
 from .options import PathLike
@@ -130,11 +130,10 @@ def run_names(path: PathLike) -> list[str]:
     if number or not place.is_file():
         return [os.fspath(path)]
     if kind == LOG:
-        count = _core.read_log(os.fsencode(place), 0, False)['runs']
+        count = int(_core.read_log(os.fsencode(place), 0, False)['runs'])
     else:
-        table = {MCAP: lambda: mcap_file(place).columns(), PARQUET: lambda: _parquet(place)[0],
-                 CSV: lambda: read_rows(place, (), ('run',)).columns}
-        count = len(starts_of(table[kind]()))
+        count = len(starts_of(McapContent(place).columns()[0] if kind == MCAP else _parquet(place)[0] if kind == PARQUET else
+                              read_rows(place, (), ('run',)).columns))
     return [os.fspath(path)] if count <= 1 else [f'{place}#{one}' for one in range(1, count + 1)]
 
 
@@ -178,11 +177,10 @@ def read_events(data: bytes, place: PathLike) -> list[Event]:
     events = []
     for number, fields in zip(text.lines[1:], lines):
         try:
-            shown = [_core.clean_text(one.encode(), most) for one, most in zip(fields[1:], (40, 40, 1000, 40, 40))]
-            events.append(Event(float(fields[0]), *shown[:3], shown[3], ''.join(shown[4:])))
-        except (IndexError, TypeError, ValueError):
-            shown = _core.clean_text(','.join(fields).encode(), 60)
-            raise ValueError(f'{place}:{number}: not an event: "{shown}"') from None
+            texts = [_core.clean_text(one.encode(), most) for one, most in zip(fields[1:], (40, 40, 1000, 40, 40))]
+            events.append(Event(float(fields[0]), texts[0], texts[1], texts[2], texts[3], ''.join(texts[4:])))
+        except (IndexError, ValueError):
+            raise ValueError(f'{place}:{number}: not an event: "{_core.clean_text(",".join(fields).encode(), 60)}"') from None
     return events
 
 
@@ -247,8 +245,8 @@ def _load_log(place: pathlib.Path, name: str) -> Run:
         result = 'completed' if reason['name'] == 'sequence_complete' else ends.get(reason['kind'])
         if result is not None:
             run.summary.update(result=result, reason=event.reason_text)
-            for counted in messages['status_t'][-1:]:
-                run.summary.update((one, getattr(counted, one)) for one in ('cycles', 'overruns', 'telemetry_drops', 'publish_failures'))
+            counts = ('cycles', 'overruns', 'telemetry_drops', 'publish_failures')
+            run.summary.update((one, getattr(status, one)) for status in messages['status_t'][-1:] for one in counts)
             return _with_figures(run)
     run.notes.append('the log ends before the run did: its result is unknown')
     return _with_figures(run)
@@ -264,7 +262,8 @@ def _losses(place: pathlib.Path, found: Mapping[str, Any], events: list[Any]) ->
     lost, events_lost = missing_in(sequences), missing_in(event_sequences)
     dropped = missing_in(cycles, every) - lost
     return [text for count, text in (
-        (lost, f'{lost} messages of telemetry are missing in the log'), (events_lost, f'{events_lost} events are missing in the log'),
+        (lost, f'{lost} messages of telemetry are missing in the log'),
+        (events_lost, f'{events_lost} events are missing in the log'),
         (dropped, f'{dropped} cycles have no message, although every {every} of them should have one')) if count > 0]
 
 
@@ -274,22 +273,25 @@ def missing_in(numbers: np.ndarray, step: int = 1) -> int:
 
 
 def _load_mcap(place: pathlib.Path, name: str) -> Run:
-    file = mcap_file(place)
-    columns, (first, last) = _one_run(file.columns(), name)
-    run = _described(columns, file.metadata, file.attachments)
-    run.start_ns = max(int(file.times_ns[first]) - round(float(run['time_s'][0]) * 1e9), 0)
-    until_ns = file.times_ns[last] if last < len(file.times_ns) else math.inf
-    run.events = run.events or [Event((time_ns - run.start_ns) * 1e-9, kind, '', message=text)
-                                for time_ns, kind, text in file.events if run.start_ns <= time_ns < until_ns]
-    if file.damage:
-        run.notes.append(f'parts of "{place}" are not used: it is cut off or damaged ({file.damage})')
+    content = McapContent(place)
+    columns, times_ns = content.columns()
+    columns, (first, last) = _one_run(columns, name)
+    run = _described(columns, content.metadata, content.attachments)
+    run.start_ns = max(int(times_ns[first]) - round(float(run['time_s'][0]) * 1e9), 0)
+    until_ns = times_ns[last] if last < len(times_ns) else math.inf
+    for topic in content.topics.values() if not run.events else ():
+        events = zip(topic.times_ns, topic.data) if topic.name == EVENT_TOPIC else ()
+        run.events += [Event((time_ns - run.start_ns) * 1e-9, log_of(data)[0], '', message=log_of(data)[1])
+                       for time_ns, data in events if run.start_ns <= time_ns < until_ns]
+    if content.damage:
+        run.notes.append(f'parts of "{place}" are not used: it is cut off or damaged ({content.damage})')
     return run
 
 
 def _load_parquet(place: pathlib.Path, name: str) -> Run:
     columns, metadata = _parquet(place)
-    return _described(_one_run(columns, name)[0], {one: data.decode(errors='replace') for one, data in metadata.items() if '.' not in one},
-                      {one: data for one, data in metadata.items() if '.' in one})
+    texts = {one: data.decode(errors='replace') for one, data in metadata.items() if '.' not in one}
+    return _described(_one_run(columns, name)[0], texts, {one: data for one, data in metadata.items() if '.' in one})
 
 
 def _parquet(place: pathlib.Path) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
@@ -300,12 +302,8 @@ def _parquet(place: pathlib.Path) -> tuple[dict[str, np.ndarray], dict[str, byte
         table = pyarrow.parquet.read_table(place)
     except (pyarrow.ArrowException, OSError) as error:
         raise ValueError(f'"{place}" is cut off or damaged ({str(error).splitlines()[0]}); convert the run again') from None
-    columns, kinds = {}, pyarrow.types
-    for name, values in zip(table.column_names, table.columns):
-        if name in TEXTS:
-            columns[name] = np.array([one or '' for one in values.to_pylist()], dtype=object)
-        elif kinds.is_floating(values.type) or kinds.is_integer(values.type) or kinds.is_boolean(values.type):
-            columns[name] = np.array(values.cast(pyarrow.float64()).to_numpy(), dtype=float)
+    columns = {name: values.fillna('').to_numpy(object) if name in TEXTS else values.to_numpy(float)
+               for name, values in table.to_pandas().items() if name in TEXTS or values.dtype.kind in 'iufb'}
     return columns, {key.decode().removeprefix('abs_hil.'): value for key, value in (table.schema.metadata or {}).items()
                      if key.startswith(b'abs_hil.')}
 
@@ -329,7 +327,7 @@ def _described(columns: dict[str, np.ndarray], metadata: Mapping[str, str], atta
     run = Run(columns, {one: metadata[one] for one in ('experiment', 'controller', 'plant', 'backend', 'result', 'reason')
                         if one in metadata}, signals_of(columns))
     run.attachments = attachments
-    run.losses = [one for one in re.split('; ', metadata.get('losses', 'none')) if one != 'none']
+    run.losses = [one for one in metadata.get('losses', 'none').split('; ') if one != 'none']
     try:
         if 'config.json' in attachments:
             run.summary['config'] = parse_json(attachments['config.json'])
@@ -346,5 +344,6 @@ def _described(columns: dict[str, np.ndarray], metadata: Mapping[str, str], atta
 def _with_figures(run: Run) -> Run:
     """With the figures of merit of its rows, which no file holds."""
     found = figures_of(run.columns, run.config)
-    run.summary.update((one, found[one] if math.isfinite(found[one]) else None) for one, row in figures().items() if row.in_summary)
+    run.summary.update((one, found[one] if math.isfinite(found[one]) else None)
+                       for one, figure in figures().items() if figure.in_summary)
     return run

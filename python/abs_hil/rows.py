@@ -8,7 +8,7 @@ import os
 import pathlib
 import re
 import zlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -87,7 +87,7 @@ def read_rows(path: str | os.PathLike[str], needed: Sequence[str] = CONTRACT, on
     return rows
 
 
-def starts_of(columns: dict[str, np.ndarray]) -> list[int]:
+def starts_of(columns: Mapping[str, np.ndarray]) -> list[int]:
     """Where the runs of a table begin: where its column `run` changes."""
     names = columns.get('run', np.empty(0))
     return [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist()]
@@ -107,7 +107,8 @@ def _unzipped(content: bytes) -> tuple[bytes, bool]:
 
 def in_order(data: bytes) -> _Text:
     """A text with points in its numbers, without quotes, comments and empty lines."""
-    separator, lines, kept = '', [], []
+    separator, lines = '', []
+    kept: list[str] = []
     for number, line in enumerate(data.decode('utf-8', 'surrogateescape').split('\n'), 1):
         line = line.rstrip('\r')
         if line.startswith(('#', 'sep=')) or not line.strip(' \t,;"'):
@@ -160,7 +161,8 @@ def _rows(place: pathlib.Path, text: _Text, truncated: bool, needed: Sequence[st
         columns[name] = values.to_numpy(dtype=np.float64 if number in numbers else object)
     if needed:
         for first, last in itertools.pairwise([*starts_of(columns), len(frame)]):
-            check_times(columns['time_s'][first:last], lambda row, first=first: f'{place}:{text.lines[first + row + 1]}')
+            lines = text.lines[first + 1:last + 1]
+            check_times(columns['time_s'][first:last], lambda row, lines=lines: f'{place}:{lines[row]}')  # type: ignore[misc]
     for name in {*TEXTS} & {*columns}:
         texts = columns[name]  # few different ones
         clean = {one: _core.clean_text(str(one).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for one in set(texts)}

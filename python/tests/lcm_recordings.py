@@ -35,7 +35,8 @@ def record(out, groups, append):
     groups = [*groups, [out.with_name('end')]]
     groups[-1][0].write_bytes(struct.pack('>IqqII', 0xEDA1DA01, 0, 10 ** 15, 3, 4) + b'ENDover')
     wanted = before + sum(os.path.getsize(log) for group in groups for log in group)
-    logger = subprocess.Popen(['lcm-logger', '-q', '--flush-interval=1', f'--lcm-url={URL}', *(['--append'] if append else ['--force']), out])
+    mode = '--append' if append else '--force'
+    logger = subprocess.Popen(['lcm-logger', '-q', '--flush-interval=1', f'--lcm-url={URL}', mode, out])
     wait_until(listeners)
     time.sleep(0.3)  # then it enters its handlers
     for group in groups:

@@ -84,7 +84,8 @@ def made(tmp_path_factory):
     return {name: (place / file, runs) for name, file, runs in (
         ('run folder', 'folder', [a]), ('event log of --log', 'a.lcmlog', [a]), ('event log of lcm-logger', 'logger.lcmlog', [a]),
         ('event log of lcm-logger --append', 'appended.lcmlog', [a, b]), ('two runs after one another', 'two.lcmlog', [a, b]),
-        ('two rigs at once', 'rigs.lcmlog', [a, b] if first.startswith('ABS_') else [b, a]), ('event log cut off', 'cut.lcmlog', [cut]), ('CSV of --csv', 'a.csv', [a]),
+        ('two rigs at once', 'rigs.lcmlog', [a, b] if first.startswith('ABS_') else [b, a]),
+        ('event log cut off', 'cut.lcmlog', [cut]), ('CSV of --csv', 'a.csv', [a]),
         ('CSV of abs_hil convert', 'converted.csv', [a]), ('CSV saved by a spreadsheet', 'saved.csv', [a]),
         ('MCAP of abs_hil convert', 'converted.mcap', [a]), ('Parquet of abs_hil convert', 'converted.parquet', [a]),
         ("somebody else's event log", 'foreign.lcmlog', []))}
@@ -200,7 +201,8 @@ def test_each_cell_of_the_table(made, tools, writer, reader):
         for one, true in zip(found, runs):
             same(one, true)
     elif cell == '#2':
-        with pytest.raises(ValueError, match="holds 2 runs: give .*#1' for the first, .*#2' for the second; `abs_hil log info") as refused:
+        words = "holds 2 runs: give .*#1' for the first, .*#2' for the second; `abs_hil log info"
+        with pytest.raises(ValueError, match=words) as refused:
             read(file, tools)
         assert str(file) in str(refused.value)
         for number, true in enumerate(runs, 1):
@@ -251,8 +253,8 @@ def test_log_info_says_of_a_log_what_lcms_own_module_finds(made, tools, writer, 
     assert told['duration_s'] == pytest.approx((max(times) - min(times)) * 1e-6)
     assert (told['damage'] is not None) == ('cut' in writer)
     virtual = file.name in ('a.lcmlog', 'cut.lcmlog')
-    start = None if virtual else datetime.datetime.fromtimestamp(min(times) * 1e-6, datetime.UTC).isoformat(timespec='milliseconds')
-    assert told['start_utc'] == start
+    start = datetime.datetime.fromtimestamp(min(times) * 1e-6, datetime.UTC).isoformat(timespec='milliseconds')
+    assert told['start_utc'] == (None if virtual else start)
     assert [run['rows'] for run in told['runs']] == [len(run['time_s']) for run in runs]
     for run, true in zip(told['runs'], runs):
         controller = 'adaptive' if 'I_m' in true else 'pi'
@@ -318,9 +320,11 @@ def test_what_is_no_recording_is_an_error_that_says_what_to_do(made, tools):
     folder, log = tools['folder'], made['event log of --log'][0].read_bytes()
     for name, content, words in (
             ('empty', b'', 'the file is empty: nothing was recorded'), ('empty.lcmlog', b'', 'the file is empty'),
-            ('text.lcmlog', b'hello', 'is no recording'), ('program', pathlib.Path(ABS_HIL).read_bytes()[:4000], 'is no recording'),
-            ('log.gz', gzip.compress(log), 'is compressed: decompress it first (gunzip)'), ('head.lcmlog', log[:20], 'cut off within'),
-            ('sheet.csv', b'PK\x03\x04' + bytes(99), 'save the table as CSV'), ('list.csv', b'name,age\nA,3\n', 'no column of a run'),
+            ('text.lcmlog', b'hello', 'is no recording'),
+            ('program', pathlib.Path(ABS_HIL).read_bytes()[:4000], 'is no recording'),
+            ('log.gz', gzip.compress(log), 'is compressed: decompress it first (gunzip)'),
+            ('head.lcmlog', log[:20], 'cut off within'), ('sheet.csv', b'PK\x03\x04' + bytes(99), 'save the table as CSV'),
+            ('list.csv', b'name,age\nA,3\n', 'no column of a run'),
             ('cut.parquet', made['Parquet of abs_hil convert'][0].read_bytes()[:5000], 'cut off or damaged'),
             ('cut.mcap', made['MCAP of abs_hil convert'][0].read_bytes()[:500], 'cut off or damaged')):
         file = folder / name
@@ -328,7 +332,8 @@ def test_what_is_no_recording_is_an_error_that_says_what_to_do(made, tools):
         for read in (by_load, by_log_info, by_report, by_convert, by_identify, by_serve):
             if (read, name) == (by_log_info, 'cut.mcap'):
                 continue  # says what is left of it
-            with pytest.raises(ValueError, match=re.escape(words) if (read, name) != (by_identify, 'list.csv') else 'lacks') as refused:
+            says = 'lacks' if (read, name) == (by_identify, 'list.csv') else re.escape(words)
+            with pytest.raises(ValueError, match=says) as refused:
                 read(file, tools)
             assert str(file) in str(refused.value) and str(refused.value).count('\n') <= 1
     with pytest.raises(ValueError, match='nowhere" does not exist; give a run folder'):

@@ -119,12 +119,14 @@ def spreadsheet(separator, decimal):
 
 
 @pytest.mark.parametrize('data', [
-    b'\xef\xbb\xbf' + spreadsheet(',', '.').encode(), b'\xef\xbb\xbf' + spreadsheet(';', ',').encode(), spreadsheet('\t', ',').encode(),
+    b'\xef\xbb\xbf' + spreadsheet(',', '.').encode(), b'\xef\xbb\xbf' + spreadsheet(';', ',').encode(),
+    spreadsheet('\t', ',').encode(),
     spreadsheet(',', ',').encode(), spreadsheet(';', '.').encode('utf-16'), ('\ufeff' + spreadsheet(';', ',')).encode('utf-16-be'),
     gzip.compress(PLAIN.encode()), PLAIN.replace('\n', '\r').encode(), b'sep=;\r\n' + spreadsheet(';', ',').encode(),
     b'# saved by hand, \xe4\n\n' + PLAIN.replace(',', ' , ').encode() + b'\n\n', PLAIN.replace('NaN', '').encode(),
     PLAIN.replace('NaN', 'nan').encode(), (spreadsheet(';', ',').replace('\r\n', ';;;\r\n') + ';' * 22 + '\r\n').encode(),
-    '\n'.join(f'{number or ""},{line}' for number, line in enumerate(PLAIN.split('\n')) if line).encode() + b'\n'])  # pandas's index
+    # with pandas's index
+    '\n'.join(f'{number or ""},{line}' for number, line in enumerate(PLAIN.split('\n')) if line).encode() + b'\n'])
 def test_what_people_and_spreadsheets_make_of_a_csv_reads_the_same(tmp_path, data):
     plain, found = read(tmp_path, PLAIN), read(tmp_path, data)
     assert not found.truncated and found.notes == []

@@ -26,8 +26,8 @@ struct RecordedRun {
   bool virtual_time{false};                 ///< a run with --fast: exact wake-ups, computations take no time
 };
 
-/// Reads a run of an event log, FILE or FILE#N. Throws telemetry::RecordingError if the log is damaged, holds no run, or several of
-/// which none is named, or if the run lacks a cycle.
+/// Reads a run of an event log, FILE or FILE#N. Throws telemetry::RecordingError if the log is damaged, holds no run,
+/// or several of which none is named, or if the run lacks a cycle.
 [[nodiscard]] RecordedRun read_run(const std::string& recording);
 
 /// Changes that a replay makes to the recorded configuration.

@@ -72,7 +72,7 @@ def log(stamp_ns: int, level: int, name: str, text: str) -> bytes:
     return _LITTLE_ENDIAN + body + b'\0' * (-len(body) % 4) + struct.pack('<I', 0)
 
 
-def log_of(data: bytes) -> tuple[str, str]:
+def log_of(data: bytes) -> tuple[str, ...]:
     """(name, text) of a message that `log` made."""
     body, place, texts = data[len(_LITTLE_ENDIAN):], struct.calcsize('<iIB'), []
     for _ in range(2):
@@ -80,7 +80,7 @@ def log_of(data: bytes) -> tuple[str, str]:
         size, = struct.unpack_from('<I', body, place)
         texts.append(body[place + 4:place + 3 + size].decode(errors='replace'))
         place += 4 + size
-    return texts[0], texts[1]
+    return tuple(texts)
 
 
 class Topics:

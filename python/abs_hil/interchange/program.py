@@ -37,19 +37,17 @@ def main(arguments: list[str]) -> int:
 
 def _convert(path: str, output: pathlib.Path) -> str:
     from . import recorded
+    from .to_csv import to_csv
     origin = named(path)[0].resolve()
     if output.resolve() == origin or origin.is_dir() and output.resolve().parent == origin:
         raise ValueError(f'OUT = {output}: this command reads it; give another file')
-    read = recorded.read(path)
-    more = ''
+    read, more = recorded.read(path), ''
     if output.suffix == '.csv':
-        from .to_csv import to_csv
-        more = to_csv(read.run, path, output)
+        more = to_csv(read, path, output)
     else:
         write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
         write_whole(output, lambda name: write(read, name))
-    losses = '; '.join(read.losses)
-    return f'{len(read.run)} rows, {len(read.events)} events{more}; lost: {losses or "nothing"}'
+    return f'{len(read)} rows, {len(read.events)} events{more}; lost: {"; ".join(read.losses) or "nothing"}'
 
 
 def _record(given: Any, output: pathlib.Path) -> str:

@@ -9,8 +9,9 @@ from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
+from .mcap_file import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC
 from .messages import McapFile, Topics
-from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, LAST_NS, LEVELS, SIGNALS_TOPIC, SIGNALS_TYPE, comment
+from .recorded import CYCLE_TYPE, LAST_NS, LEVELS, SIGNALS_TYPE, comment
 
 STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
 

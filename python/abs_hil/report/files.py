@@ -133,7 +133,7 @@ def _read_folder(run: RunFiles, folder: pathlib.Path) -> None:
     else:
         run.config = there('config.toml', 'the configuration is unknown', read_toml) or {}
     run.environment = texts_of(there('environment.json', 'kernel, build and board are unknown', read_object) or {})
-    run.events = there('events.csv', 'events are the phase changes in the CSV, without reasons', 
+    run.events = there('events.csv', 'events are the phase changes in the CSV, without reasons',
                        lambda path: read_events(path.read_bytes(), path)) or []
     if run.summary.get('virtual_time') is not True:
         run.histogram = there('histogram.txt', "no histograms of the cycle's timing", read_histogram)
@@ -157,13 +157,13 @@ def _load_run(path: pathlib.Path) -> RunFiles:
         return RunFiles(path, _base_name(path), notes=[
             'only a CSV file: configuration, reasons and timing are unknown; metrics are computed from it with the paper\'s '
             'radius and end speed'])
-    run = load(path)
-    return RunFiles(path, clean(run.name, NAME_CHARACTERS), summary=run.summary, config=texts_of(run.config), events=run.events,
-                    notes=[*run.notes, *run.losses])
+    read = load(path)
+    return RunFiles(path, clean(read.name, NAME_CHARACTERS), summary=read.summary, config=texts_of(read.config),
+                    events=read.events, notes=[*read.notes, *read.losses])
 
 
 def find_runs(arguments: Iterable[str | pathlib.Path], labels: Sequence[str] = ()) -> FoundRuns:
-    """The runs that the command line names: files of runs (of several in one file all), run folders, series folders. Raises ValueError."""
+    """The runs that the command line names: files, of several runs in one all; run folders; series folders. Raises ValueError."""
     found = FoundRuns()
     for argument in arguments:
         path = pathlib.Path(argument)

@@ -96,7 +96,8 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         ends = [place for place, _ in brakings[1:]] + [len(time)]
         for number, ((first, pulse), last) in enumerate(zip(brakings, ends), 1):
             name = next(phase.shown for phase in reversed(found.phases) if phase.from_s <= time[first])
-            found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}', figures_of(rows.columns, run.config, first, last)))
+            found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}',
+                                   figures_of(rows.columns, run.config, first, last)))
     found.changes = _changes(run, rows, found.r2_m)
     return found
 

@@ -3,7 +3,7 @@ foxglove.sdk.v1 by the package foxglove-sdk, whose threads are this process's on
 from typing import Any
 
 from ..interchange import messages
-from ..interchange.recorded import EVENT_TOPIC
+from ..interchange.mcap_file import EVENT_TOPIC
 from ..interchange.running import Translator
 from ..places import how_to_install
 

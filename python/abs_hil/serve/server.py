@@ -20,7 +20,7 @@ from ..messages import PHASES, QUANTITIES
 from ..nesting import parse_json
 from ..places import charts, misfit
 from ..run import COLUMNS as CSV_COLUMNS
-from ..run import csv_bytes, phase_names
+from ..run import Event, csv_bytes, phase_names
 from .feed import Feed
 from .runs import BIN_S, COLUMNS, DERIVED, PLACE, RunFacts
 from .viewer import REASON_KINDS, STUCK_S, Bad, Viewer, real, whole
@@ -224,7 +224,7 @@ def file_of(kind: str, run: RunFacts, rows: np.ndarray) -> BinaryIO:
         if kind == 'mcap':
             from ..interchange import recorded
             read = recorded.read(str(place))
-            read.events = [recorded.Event(event['time_s'], event['kind'], event['text']) for event in run.events]
+            read.events = [Event(event['time_s'], event['kind'], '', message=event['text']) for event in run.events]
             place = place.with_suffix('.mcap')
             recorded.to_mcap(read, str(place))
         return place.open('rb')
