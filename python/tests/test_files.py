@@ -103,8 +103,9 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
         assert result.returncode == 1 and 'cannot write to standard output' in result.stderr, result
         assert result.stderr.count('\n') == 1, result
     made = tmp_path / 'made'
-    for words in (('report', '--csv', tmp_path / 'run'), ('report', '--json', tmp_path / 'run'), ('report', '--octave', tmp_path / 'run'),
-                  ('report', '--table', tmp_path / 'run'), ('report', '--help'), ('rig', 'steady', '1', '--out', made), ('export-fmu', '--out', f'{made}.fmu'), ('tune', '--help')):
+    reports = [('report', kind, tmp_path / 'run') for kind in ('--csv', '--json', '--octave', '--table')]
+    for words in (*reports, ('report', '--help'), ('rig', 'steady', '1', '--out', made), ('export-fmu', '--out', f'{made}.fmu'),
+                  ('tune', '--help')):
         nobody, out = os.pipe()
         os.close(nobody)
         result = subprocess.run(command(*words), stdout=out, stderr=subprocess.PIPE, text=True)

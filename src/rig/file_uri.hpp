@@ -1,3 +1,4 @@
+// URIs of files by RFC 8089 and RFC 3986: made for the FMUs that we start, and read by the FMUs that we export.
 #pragma once
 
 #include <algorithm>

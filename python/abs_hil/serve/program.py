@@ -73,7 +73,8 @@ async def _serve(given: Any, source: Live | Played) -> int:
     try:
         await server.start()
     except OSError as error:
-        raise OSError(f'cannot listen at --host {given.host}, --port {given.port}: {refusal(error, given.host, "reach")}') from None
+        why = refusal(error, given.host, 'reach')
+        raise OSError(f'cannot listen at --host {given.host}, --port {given.port}: {why}') from None
     print(f'abs_hil serve: {server.link}', flush=True)
     if foxglove is not None:
         print(f'abs_hil serve: for Foxglove, Lichtblick, PlotJuggler: {foxglove.link}', flush=True)
