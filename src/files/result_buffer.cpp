@@ -5,7 +5,7 @@
 namespace abs_hil::files {
 
 FileError::FileError(std::string_view kind, const std::filesystem::path& path, int error_number)
-    : FileError(kind, path, rig::refusal(error_number, path, rig::writing), error_number) {}
+    : FileError(kind, path, rig::refusal(error_number, path.string(), rig::writing), error_number) {}
 
 FileError::FileError(std::string_view kind, const std::filesystem::path& path, std::string_view why, int error_number)
     : std::runtime_error(

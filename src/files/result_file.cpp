@@ -112,7 +112,7 @@ ResultFile::~ResultFile() {
 
 void ResultFile::fail(int error_number) const {
   const fs::path& place = target_.empty() ? path_ : target_;  // behind a link
-  throw FileError(kind_, path_, rig::refusal(error_number, place, rig::writing), error_number);
+  throw FileError(kind_, path_, rig::refusal(error_number, place.string(), rig::writing), error_number);
 }
 
 /// Opens a stream, or finds the place of the file.

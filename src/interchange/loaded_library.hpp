@@ -21,8 +21,13 @@ class LoadedLibrary {
       // elsewhere.
       : file_(std::move(file)), handle_(::dlopen(std::filesystem::absolute(library).c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (handle_) return;
+    const std::string place = std::filesystem::absolute(library).string();
+    const std::string why = ::dlerror();
+    // The loader says of a library for another processor that there is no such file.
+    const bool foreign =
+        why.starts_with(place + ": cannot open shared object file: No such file") && std::filesystem::exists(place);
     refuse(file_, "not a shared library that this computer can load: " +
-                      rig::refusal(std::string(::dlerror()), std::filesystem::absolute(library)));
+                      (foreign ? place + ": it is for another processor: build it here" : rig::refusal(why, place)));
   }
   /// The function or object of that name. Throws std::invalid_argument if there is none.
   template <class Symbol>

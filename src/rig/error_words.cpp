@@ -8,10 +8,13 @@
 
 namespace abs_hil::rig {
 
-namespace fs = std::filesystem;
-
 namespace {
 
+#ifdef _WIN32
+constexpr std::string_view separators = "/\\";
+#else
+constexpr std::string_view separators = "/";
+#endif
 constexpr unsigned any = writing | reading | starting | reaching;
 #ifdef _WIN32
 constexpr int EDQUOT = ENOSPC, ESTALE = EIO;
@@ -95,11 +98,11 @@ constexpr WordsRow words_rows[] = {
     {"Invalid account", "name your account (sacctmgr show associations): -- --account=NAME"},
 };
 
-std::string with_fix(std::string_view words, std::string_view fix, const fs::path& place) {
+std::string with_fix(std::string_view words, std::string_view fix, const std::string& place) {
   std::string text = std::string(words) + "; " + std::string(fix);
-  const std::string folder = place.has_parent_path() ? place.parent_path().string() : ".";
-  for (const auto& [mark, value] :
-       {std::pair<std::string_view, std::string>{"{place}", place.string()}, {"{folder}", folder}}) {
+  const std::size_t end = place.find_last_of(separators);
+  const std::string folder = end == std::string::npos ? "." : place.substr(0, std::max<std::size_t>(end, 1));
+  for (const auto& [mark, value] : {std::pair<std::string_view, std::string>{"{place}", place}, {"{folder}", folder}}) {
     const std::size_t at = text.find(mark, words.size());
     if (at != std::string::npos) text.replace(at, mark.size(), value);
   }
@@ -108,18 +111,14 @@ std::string with_fix(std::string_view words, std::string_view fix, const fs::pat
 
 }  // namespace
 
-std::string refusal(int error, const fs::path& place, Deed deed) {
+std::string refusal(int error, const std::string& place, Deed deed) {
   const auto* const row = std::ranges::find_if(
       errors, [&](const ErrorRow& r) { return (r.number == error || r.same == error) && (r.deeds & deed) != 0; });
   return with_fix(std::generic_category().message(error), row != std::end(errors) ? row->fix : "choose another path",
                   place);
 }
 
-std::string refusal(std::string_view words, const fs::path& place, std::string_view otherwise) {
-  // The loader says so of a library for another processor, too.
-  std::error_code error;
-  const bool missing = words.starts_with(place.string() + ": cannot open shared object file: No such file");
-  if (missing && fs::exists(place, error)) return place.string() + ": it is for another processor: build it here";
+std::string refusal(std::string_view words, const std::string& place, std::string_view otherwise) {
   const auto* const row = std::ranges::find_if(
       words_rows, [&](const WordsRow& r) { return words.find(r.words) != std::string_view::npos; });
   const std::string_view fix = row != std::end(words_rows) ? row->fix : otherwise;

@@ -190,7 +190,7 @@ class Page(ReportTest):
         text = (a / 'run.csv').read_text()
         (a / 'run.csv').write_text(text.replace(',zeta_N,', ",<img src=x onerror=alert(1)>,", 1))
         read = PageReader(self.page(a)[0])
-        self.assertEqual([c['quantity'] for c in read.figures['signals']], ['I_m', 'omega1_hat_rad_s'])
+        self.assertEqual([c['quantity'] for c in read.figures['signals']], ['I_m', 'omega1_hat_rad_s', 'V', 'V_dot'])
 
     def test_the_same_page_twice(self):
         a = self.make_run('a')
@@ -394,7 +394,7 @@ class Files(ReportTest):
         lines = (a / 'run.csv').read_text().splitlines(keepends=True)
         broken = self.folder / 'broken.csv'
         for text, says in (
-                ([], 'broken.csv:1: the file is empty'),
+                ([], 'broken.csv: the file is empty'),
                 (lines[:1], 'broken.csv:1: no rows after the header'),
                 ([lines[0], lines[1][:9]], 'broken.csv:2: the only row is incomplete'),
                 ([*lines[:50], 'garbage\n', *lines[50:]], 'broken.csv:51: time_s: "garbage" is not a number'),

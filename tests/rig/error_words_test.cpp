@@ -57,13 +57,9 @@ TEST_CASE("the loader's words name the cause and the fix") {
           "\x7f"
           "ELF");
   constexpr std::size_t class_at = 4;
-  constexpr std::size_t machine_at = 18;
   std::string bits32 = head;
   bits32[class_at] = 1;
   CHECK_THAT(loaded(file, bits32), Contains("32 bits"));
-  std::string other = head;
-  other[machine_at] = static_cast<char>(head[machine_at] == '\x3e' ? 0xB7 : 0x3E);
-  CHECK_THAT(loaded(file, other), Contains("another processor") && !Contains("No such file"));
   CHECK_THAT(loaded(file, "hello"), Contains("no library for Linux"));
   CHECK_THAT(loaded(file, std::string(500, 'x')), Contains("no library for Linux"));
   fs::remove(file);
