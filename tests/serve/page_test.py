@@ -4,7 +4,6 @@ usage: page_test.py ABS_HIL ABS_SERVE PRIVATE_NETWORK_SCRIPT [FOLDER for screens
 """
 import asyncio
 import base64
-import os
 import pathlib
 import shutil
 import subprocess

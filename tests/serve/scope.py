@@ -5,11 +5,9 @@ import json
 import os
 import pathlib
 import subprocess
-import sys
 from urllib.parse import urlsplit
 
 import numpy as np
-
 import websockets
 
 BIN_S = 0.02
