@@ -107,7 +107,7 @@ def test_a_comparison_and_a_study_take_it(folder, abs_hil_program):
     assert studied['stop_distance_m'].iloc[0] == pytest.approx(alone.summary['stop_distance_m'], rel=1e-6)
 
 
-@pytest.mark.parametrize('name, said', [('laws:Nothing', "has no attribute 'Nothing'; give MODULE:CLASS"),
+@pytest.mark.parametrize('name, said', [('laws:Nothing', "laws.py); give MODULE:CLASS"),
                                         ('nowhere:Law', "No module named 'nowhere'; give MODULE:CLASS"),
                                         ('laws:Alone', 'it has no methods reset and step'),
                                         ('laws:Demanding', 'the class is made without arguments'),

@@ -172,14 +172,13 @@ void keep_files() {
     std::uint64_t allowed;
     std::int32_t folder;
   };
-  std::error_code error;
   const auto allow = [&](const std::filesystem::path& path, std::uint64_t allowed) {
     const Below below{.allowed = allowed, .folder = ::open(path.c_str(), O_PATH | O_CLOEXEC)};
     if (below.folder < 0) return;
     static_cast<void>(::syscall(add_rule, rules, below_path, &below, 0));
     ::close(below.folder);
   };
-  allow(std::filesystem::temp_directory_path(error), handled);
+  allow(temporary_folder(), handled);
   allow("/dev/null", 0x2);
   static_cast<void>(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0));
   static_cast<void>(::syscall(restrict_self, rules, 0));
@@ -187,6 +186,11 @@ void keep_files() {
 }
 
 }  // namespace
+
+std::filesystem::path temporary_folder() {
+  const char* given = std::getenv("TMPDIR");
+  return std::filesystem::absolute(given != nullptr && *given != '\0' ? given : "/tmp");
+}
 
 std::string confine(int socket) {
   const auto failed = [](const char* what) { return std::string(what) + ": " + std::strerror(errno); };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 namespace abs_hil::interchange {
@@ -11,6 +12,9 @@ inline constexpr std::uint64_t host_address_bytes_max = std::uint64_t{4} << 30U;
 inline constexpr std::uint64_t host_file_bytes_max = std::uint64_t{64} << 20U;    ///< a file that it writes
 inline constexpr std::uint64_t host_descriptors_max = 128;                        ///< files open at once
 inline constexpr std::uint64_t host_threads_max = 256;                            ///< counted by the run
+
+/// The folder in which foreign code may write, and FMUs are unpacked: TMPDIR, else /tmp.
+[[nodiscard]] std::filesystem::path temporary_folder();
 
 /// From now on this process may use no more than the limits above; it may start no process, touch no other process,
 /// take no priority, open no socket and write no file outside the folder for temporary files (the last where the kernel

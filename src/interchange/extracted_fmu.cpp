@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "interchange/confinement.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
 #include "rig/error_words.hpp"
@@ -113,7 +114,7 @@ std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
 }
 
 [[noreturn]] void refuse_temporary(const fs::path& place, int error) {
-  throw driver::Unavailable(fmt::format("an FMU is unpacked into the folder for temporary files, {}: {}; or set TMPDIR",
+  throw driver::Unavailable(fmt::format("an FMU is unpacked into the folder for temporary files (TMPDIR, /tmp): {}: {}",
                                         place.string(), rig::refusal(error, place, rig::writing)));
 }
 
@@ -200,12 +201,8 @@ void check_count(const fs::path& file) {
 }  // namespace
 
 ExtractedFmu::ExtractedFmu() {
-  std::error_code error;
-  const fs::path parent = fs::temp_directory_path(error);
-  const char* given = std::getenv("TMPDIR");
-  if (error) refuse_temporary(given != nullptr ? given : "/tmp", error.value());
-  std::string name = (parent / "abs_hil_fmu.XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) refuse_temporary(parent, errno);
+  std::string name = (temporary_folder() / "abs_hil_fmu.XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) refuse_temporary(name, errno);
   folder_ = name;
 }
 

@@ -118,11 +118,25 @@ class Files(ProgramTest):
         self.assertEqual(self.run_program('export-fmu', '--controller', 'adaptive', '--out', path).returncode, 0)
         return path
 
-    def test_a_folder_for_temporary_files_that_is_gone_is_named(self):
-        result = self.run_program('--fast', '--no-lcm', '--controller', self.fmu(), env={**os.environ, 'TMPDIR': '/nonexistent/job.1'})
-        self.assertEqual(result.returncode, 3, result.stderr)
-        self.assertIn('/nonexistent/job.1', result.stderr)
-        self.assertIn('TMPDIR', result.stderr)
+    def test_a_folder_for_temporary_files_that_cannot_be_used_is_named(self):
+        law, file = self.fmu(), self.folder / 'file'
+        file.touch()
+        for place in ('/nonexistent/job.1', file, 'gone', '/proc'):
+            result = self.run_program('--fast', '--no-lcm', '--controller', law, env={**os.environ, 'TMPDIR': str(place)},
+                                      cwd=self.folder)
+            self.assertEqual(result.returncode, 3, result.stderr)
+            self.assertIn(str(place), result.stderr)
+            self.assertIn('TMPDIR', result.stderr)
+
+    def test_any_folder_for_temporary_files_serves(self):
+        """Also a relative one, from which an URI of the standard must be made, and none."""
+        law, names = self.fmu(), self.folder / 'map.toml'
+        names.write_text('[outputs]\nbrake_torque_ref_Nm = "brake_torque_Nm"\n[inputs]\nupper_counts = "start"\nlower_counts = "start"\n')
+        (self.folder / 'a %41').mkdir()
+        for place in ('a %41', self.folder / 'a %41', '.', ''):
+            result = self.run_program('--fast', '--no-lcm', '--no-out', '--controller', law, *START, '--set', 'plant.ideal_sensors=true',
+                                      '--set', f'control.foreign.mapping={names}', env={**os.environ, 'TMPDIR': str(place)}, cwd=self.folder)
+            self.assertIn('stop time', result.stdout, (place, result.stderr))
 
     @unittest.skipUnless(CC, 'no compiler for C')
     def test_what_the_loader_says_has_a_cause_and_a_fix(self):
