@@ -88,7 +88,7 @@ MISMATCHES: dict[str, tuple[dict[str, Value], bool, dict[str, Value]]] = {
 #: A drop of friction that meets a slower car locks the wheel whatever the brake does: then the road is even instead.
 LEAST_AT_DROP_M_S = 3.0
 #: changes that the model has no key for
-_PLANT_ONLY = ('brake_dead_time_s', 'brake_hysteresis')
+_PLANT_ONLY = ('brake_hysteresis',)
 #: roads of the mismatches
 _MISMATCH_ROADS = ('even', 'jump', 'patches')
 #: The drivers of the boards send no larger duty by default (docs/rig-setup.md). Gate and controllers know it.

@@ -160,7 +160,7 @@ Expectation write(Backend backend, const driver::Injection& injection) {
       return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
                Reason::encoder_upper_stuck, Reason::released_wheel_stands, Reason::encoders_disagree},
               // Capped at 0.7 as on the boards, a random brake acts roughly like the commanded one.
-              late || (backend != Backend::sim && !before(*injection.phase, Phase::coast)),
+              late || (is_board(backend) && !before(*injection.phase, Phase::coast)),
               random_s};
     default: return {{Reason::brake_no_response}, true, response_s};
   }
