@@ -1,5 +1,6 @@
 """The page of an identification: fits, residuals, intervals, correlations, what to run next."""
 import pathlib
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -9,16 +10,18 @@ from ..report.page import render, view
 from ..report.tables import Table
 from ..run import stretches
 from .advice import Advice
-from .found import Identified
+from .found import Estimate, Identified
+from .problem import residuals
 from .results import shown
+from .speeds import SpeedsFound
 
 _FOLDER = pathlib.Path(__file__).parent
 _MOST_POINTS = 4000
 
 
-def _parameters(found: Identified) -> Table:
+def _parameters(every: Mapping[str, Estimate]) -> Table:
     rows = []
-    for name, e in {**found.parameters, **found.combinations}.items():
+    for name, e in every.items():
         value, interval = shown(e)
         width = '–'
         if e.low is not None and e.high is not None and e.status != 'fixed' and e.value:
@@ -30,6 +33,9 @@ def _parameters(found: Identified) -> Table:
 def _log_figures(found: Identified) -> list[Figure]:
     fit = found.fit
     figures = []
+    by_phase: dict[str, str] = {}
+    for rms, name, phase in residuals(fit):
+        by_phase[name] = ', '.join(filter(None, (by_phase.get(name), f'{phase or "all"} {rms:.3f}')))
     for number, log in enumerate(found.logs):
         motion = fit.problem.motions[number]
         speeds = [Curve(0, name, run_style(i), *_thinned(log.time_s, motion.speed_rad_s[:, i]), legend=name, group=name)
@@ -42,22 +48,16 @@ def _log_figures(found: Identified) -> list[Figure]:
         left = np.concatenate([np.empty((0, 2)), *(piece.linear['residual'][:, :, 0] for piece in pieces)])
         left /= fit.problem.radians_per_count
         shown_left = np.where(weight > 0, left, np.nan)
-        residuals = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
+        left_over = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
                      for i, name in enumerate(('upper wheel', 'lower wheel')) if pieces]
         figures.append(Figure(
             f'log-{number + 1}', log.name, Label('time, s', 'time, s'),
             [Panel(Label('speed, rad/s', 'speed, rad/s'), speeds, height_px=150.0),
              Panel(Label('duty', 'duty'), duties, height_px=90.0),
-             Panel(Label('residual, counts', 'residual, counts'), residuals, height_px=110.0)],
-            caption=f'{len(log)} rows; residual by phase: {_by_phase(log.phase[rows], weight, left)}.', axis=f'log-{number + 1}',
+             Panel(Label('residual, counts', 'residual, counts'), left_over, height_px=110.0)],
+            caption=f'{len(log)} rows; residual by phase: {by_phase.get(log.name, "none")}.', axis=f'log-{number + 1}',
             shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)]))
     return figures
-
-
-def _by_phase(phases: np.ndarray, weight: np.ndarray, left: np.ndarray) -> str:
-    parts = [(str(phase) or 'all', phases == phase) for phase in dict.fromkeys(phases)]
-    return ', '.join(f'{phase} {np.sqrt(np.average(left[rows]**2, weights=weight[rows])):.3f}' for phase, rows in parts
-                     if weight[rows].any())
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,17 +79,52 @@ def _correlations(found: Identified) -> Table:
 
 def page(found: Identified, advice: list[Advice]) -> str:
     figures = _log_figures(found)
-    validation = Table('validation', ['', 'measured', 'predicted', 'error'], [])
+    validation = Table('validation', ['', 'measured', 'predicted', 'interval', 'error'], [])
     if found.validation is not None:
         v = found.validation
         for name, label in (('stop_distance_m', 'stop distance, m'), ('stop_time_s', 'stop time, s')):
-            error = v[f'{name}_error']
+            error, interval = v[f'{name}_error'], v[f'{name}_interval']
             validation.rows.append([label, f'{v[name]:.5g}', f'{v[f"predicted_{name}"]:.5g}',
+                                    '–' if interval is None else '{:.5g} to {:.5g}'.format(*interval),
                                     '–' if error is None else f'{100 * error:+.3f} %'])
     logs = Table('logs', ['log', 'rows', 's', 'disagreement', 'sha256'],
                  [[log.name, str(len(log)), f'{log.time_s[-1] - log.time_s[0]:.1f}',
                    f'{found.disagreement[log.name]:.2f}' if log.name in found.disagreement else '–', log.sha256[:16]]
                   for log in found.logs])
-    return render('identification.html.j2', figures, _FOLDER, version=_core.version, found=found,
-                  parameters=_parameters(found), correlations=_correlations(found), validation=validation, logs=logs,
-                  advice=[one.sentence() for one in advice], figures=[view(figure) for figure in figures])
+    lead = (f'{len(found.logs)} logs, form {"undecided" if found.undecided else found.form}; residual '
+            f'{found.residual_counts_rms:.4f} counts RMS (0.2887 if nothing but the steps of the counts disturbs).')
+    hint = ('Shaded: the wheels are apart. Each residual is that of a window of the log, simulated from its own most likely '
+            'state. Disagreement is the chi-square over its degrees of freedom of one log against all: about 1 for one rig.')
+    return _rendered(found, figures, lead, hint, {} if found.refused else {**found.parameters, **found.combinations}, logs,
+                     Table('correlations', [], []) if found.refused else _correlations(found), validation,
+                     [one.sentence() for one in advice])
+
+
+def speeds_page(found: SpeedsFound) -> str:
+    figures = []
+    for number, trace in enumerate(found.traces):
+        panels = []
+        for i, one in enumerate(trace.channels):
+            unit = '' if one.kind == 'slip' else ', m/s' if one.at_rim else ', rad/s'
+            label = f'{one.kind}{unit}'
+            curves = [Curve(0, name, run_style(style), one.time_s, values, legend=name if i == 0 else '', group=name)
+                      for style, name, values in ((0, 'measured', one.value), (1, 'simulated', found.curves[number][i]))]
+            panels.append(Panel(Label.plain(label), curves, height_px=150.0))
+        figures.append(Figure(f'trace-{number + 1}', trace.name, Label('time, s', 'time, s'), panels,
+                              caption=', '.join(f'{kind} {rms:.3g} {unit} RMS' for name, kind, rms, unit in found.left
+                                                if name == trace.name), axis=f'trace-{number + 1}'))
+    logs = Table('logs', ['trace', 'readings', 's', 'sha256'], [
+        [trace.name, str(sum(len(one.value) for one in trace.channels)), f'{trace.end_s - trace.begin_s:.2f}', trace.sha256[:16]]
+        for trace in found.traces])
+    lead = (f'{len(found.traces)} coarse traces, form {found.form.meaning}, all that is not listed as in {found.start}. What the '
+            'fit leaves stands below each figure.')
+    return _rendered(found, figures, lead, 'Simulated: the plant under the duties of the trace, open loop, read as the trace was.',
+                     {} if found.misfit else found.parameters, logs, Table('correlations', [], []),
+                     Table('validation', [], []), [])
+
+
+def _rendered(found: Identified | SpeedsFound, figures: list[Figure], lead: str, hint: str,
+              parameters: Mapping[str, Estimate], logs: Table, correlations: Table, validation: Table, advice: list[str]) -> str:
+    return render('identification.html.j2', figures, _FOLDER, version=_core.version, found=found, lead=lead, hint=hint,
+                  parameters=_parameters(parameters), correlations=correlations, validation=validation, logs=logs, advice=advice,
+                  figures=[view(figure) for figure in figures])

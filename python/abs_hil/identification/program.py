@@ -6,7 +6,7 @@ import json
 import pathlib
 import sys
 import time
-from typing import TextIO
+from typing import Any, TextIO
 
 from ..core import _core
 from ..files import make_folder, refuse_existing, write_text, write_whole
@@ -14,9 +14,10 @@ from ..options import failed, whole
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import identify
-from .found import Identified
 from .parameters import FORMS
-from .results import as_json, as_toml, validate, validating, words
+from .results import as_json, as_toml, speeds_as_json, speeds_as_toml, validate, validating, words
+from .speeds import identify_speeds
+from .traces import KEYS, checked_key, load_trace
 
 MISFIT = 1
 INTERRUPTED = 130
@@ -80,11 +81,35 @@ def duration(seconds: float) -> str:
     return f'{seconds:.0f} s' if seconds < 90.0 else f'{seconds / 60.0:.0f} min'
 
 
+class _Speeds(argparse.Action):
+    """Keeps each file with its keys."""
+    def __call__(self, parser: argparse.ArgumentParser, o: argparse.Namespace, value: Any, option: str | None = None) -> None:
+        o.speeds = [*o.speeds, (value, {})]
+
+
+class _Reading(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, o: argparse.Namespace, value: Any, option: str | None = None) -> None:
+        try:
+            key, number = checked_key(value)
+        except ValueError as error:
+            parser.error(str(error))
+        if o.speeds:
+            o.speeds[-1][1][key] = number
+        else:
+            o.reading = {**o.reading, key: number}
+
+
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_identify', allow_abbrev=False, description="Estimates the rig's parameters from its own "
                                    'logs and writes a model file (docs/identification.md)')
-    made.add_argument('logs', metavar='LOG', nargs='+', help='run folders, event logs, or CSV files with time_s, upper_counts, '
+    made.add_argument('logs', metavar='LOG', nargs='*', help='run folders, event logs, or CSV files with time_s, upper_counts, '
                       'lower_counts, brake_pwm, motor_pwm and, if there, phase and wheels_apart; gzip or not')
+    made.add_argument('--speeds', metavar='FILE', action=_Speeds, default=[],
+                      help='instead of logs, a CSV file of coarse wheel speeds: time_s and some of upper_rpm, lower_rpm (also '
+                      '_rad_s, _m_s), slip, brake_pwm, motor_pwm; may be repeated')
+    made.add_argument('--reading', metavar='KEY=VALUE', action=_Reading, default={},
+                      help='how the --speeds FILE before it was read, or, before the first one, all of them: '
+                      + '; '.join(f'{key}: {one.what}' for key, one in KEYS.items()).replace('%', '%%'))
     made.add_argument('--start', metavar='NAME|FILE', default='paper-table1',
                       help='plant with the given J2 and r2, and what the logs do not tell [paper-table1]')
     made.add_argument('--fix', metavar='KEY[=VALUE]', action='append', default=[],
@@ -114,22 +139,47 @@ def _fixed(texts: list[str]) -> dict[str, float | None]:
     return fixed
 
 
-def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None:
-    files = {'identified.json': json.dumps(as_json(found), indent=1, allow_nan=False) + '\n'}
-    if not (found.misfit or found.interrupted):
-        files['model.toml'] = as_toml(found)
+def _write(out: pathlib.Path, content: dict[str, Any], model: str, report: str | None) -> None:
+    """identified.json, model.toml unless it is empty, and the page."""
+    files = {'identified.json': json.dumps(content, indent=1, allow_nan=False) + '\n'}
+    if model:
+        files['model.toml'] = model
     else:
-        (o.out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
+        (out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
     if report is not None:
         files['report.html'] = report
     for name, text in files.items():
-        path = o.out / name
+        path = out / name
         write_text(path, text)
         print(path)
 
 
+def _speeds(o: argparse.Namespace, fixed: dict[str, float | None], progress: Progress) -> int:
+    traces = [load_trace(file, {**o.reading, **keys}) for file, keys in o.speeds]
+    try:
+        found = identify_speeds(traces, o.start, fix=fixed, say=progress.say, check=progress.check)
+    finally:
+        progress.clear()
+    from .page import speeds_page
+    report = None if o.no_report else speeds_page(found)
+    progress.end()
+    if not found.misfit:
+        print('\n'.join(words(found.parameters)), flush=True)
+    for line in (*(f'{name}: {kind} fitted within {rms:.3g} {unit} RMS' for name, kind, rms, unit in found.left), *found.notes,
+                 *([found.misfit] if found.misfit else [])):
+        progress.say(clean(line, 2000))
+    _write(o.out, speeds_as_json(found), '' if found.misfit else speeds_as_toml(found), report)
+    return MISFIT if found.misfit else 0
+
+
 def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
+    if bool(o.logs) == bool(o.speeds):
+        raise ValueError('give logs, or coarse traces with --speeds FILE' + (', not both' if o.logs else ''))
+    if o.speeds and (o.validate or o.drift or o.form != 'auto'):
+        raise ValueError('--validate, --drift and --form go with logs of counts, not with --speeds')
+    if o.reading and not o.speeds:
+        raise ValueError('--reading goes with --speeds FILE')
     run = validating(o.validate) if o.validate else None
     make_folder(o.out, '--out')
     for name in ('identified.json', 'model.toml', 'report.html'):
@@ -140,6 +190,8 @@ def _identify(o: argparse.Namespace) -> int:
 
     progress = Progress()
     say = progress.say
+    if o.speeds:
+        return _speeds(o, fixed, progress)
     try:
         found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say, check=progress.check)
     finally:
@@ -148,6 +200,9 @@ def _identify(o: argparse.Namespace) -> int:
         found.validation = validate(found, run)
         say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
             f'{found.validation["predicted_stop_distance_m"]:.5g} m')
+        if found.validation['misfit']:
+            found.misfit = f'{found.validation["misfit"]}. So no model.toml is written'
+            found.notes.insert(0, found.misfit)
     report = None
     if not o.no_report and not found.interrupted:
         from .advice import advise
@@ -155,10 +210,11 @@ def _identify(o: argparse.Namespace) -> int:
         say('what to run next')
         report = page(found, [] if found.misfit else advise(found, progress.check))
     progress.end()
-    print('\n'.join(words(found)), flush=True)
+    if not found.refused:
+        print('\n'.join(words({**found.parameters, **found.combinations})), flush=True)
     for note in found.notes:
         say(clean(note, 2000))
-    _write(found, o, report)
+    _write(o.out, as_json(found), '' if found.misfit or found.interrupted else as_toml(found), report)
     return INTERRUPTED if found.interrupted else MISFIT if found.misfit else 0
 
 
