@@ -20,8 +20,6 @@ install(FILES packaging/guardian.toml DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_h
 install(FILES packaging/systemd/abs-guardian.service packaging/systemd/abs_guardian.slice
   DESTINATION ${ABS_HIL_SYSTEMD_DIR} COMPONENT runtime)
 install(FILES packaging/abs_hil.sysusers DESTINATION ${ABS_HIL_SYSUSERS_DIR} RENAME abs_hil.conf COMPONENT runtime)
-install(FILES completion/abs_hil.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME abs_hil
-  COMPONENT runtime)
 install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 
@@ -67,6 +65,18 @@ else()
   message(STATUS "help2man is not installed: no manual pages")
 endif()
 
+# Tab completion, from the programs' --help, too.
+if(ABS_HIL_PYTHON AND NOT SKBUILD)
+  set(completion ${CMAKE_BINARY_DIR}/completion)
+  add_custom_command(OUTPUT ${completion}/zsh/_abs_hil
+    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/completion.py ${completion} ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}
+    DEPENDS ${programs} abs_hil_executable abs_hil_python ${PROJECT_SOURCE_DIR}/scripts/completion.py VERBATIM)
+  add_custom_target(abs_hil_completion ALL DEPENDS ${completion}/zsh/_abs_hil)
+  install(DIRECTORY ${completion}/bash/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
+  install(DIRECTORY ${completion}/zsh/ DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT runtime)
+  install(DIRECTORY ${completion}/fish/ DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT runtime)
+endif()
+
 # The rooms as libraries, for programs with their own controller.
 get_property(abs_hil_rooms GLOBAL PROPERTY ABS_HIL_ROOMS)
 install(TARGETS ${abs_hil_rooms} EXPORT abs_hil_targets
@@ -83,7 +93,7 @@ install(FILES ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake ${CMAKE_BINARY_DIR}/abs_hi
 
 # Builds what `cmake --install` needs: the programs with their pages and modules, without tests and benchmarks.
 add_custom_target(abs_hil_installed)
-foreach(target abs_hil_programs abs_hil_manual_pages abs_hil_python abs_hil_types_jar)
+foreach(target abs_hil_programs abs_hil_manual_pages abs_hil_completion abs_hil_python abs_hil_types_jar)
   if(TARGET ${target})
     add_dependencies(abs_hil_installed ${target})
   endif()

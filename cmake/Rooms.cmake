@@ -2,6 +2,7 @@
 # libraries, their include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made
 # from it. A room knows only rooms above it, so there is no circle.
 set(ABS_HIL_ROOM_TABLE
+  "version | what this build is: version, commit, compiler | "
   "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
   "files | the one writer of results: whole or not at all, and never in place of what is no regular file | rig"
   "cli | options and subcommands of a program as rows, the only source that includes CLI11 | rig"
@@ -15,16 +16,16 @@ set(ABS_HIL_ROOM_TABLE
   "lcmtypes | the message types, generated from `lcmtypes/*.lcm` | "
   "telemetry | LCM messages, event log, CSV, flight record, status line | files rig lcmtypes"
   "analysis | metrics, summary | rig"
-  "run_folder | run folders: layout, environment, checksums, the index of a series | files rig"
+  "run_folder | run folders: layout, environment, checksums, the index of a series | version files rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | files rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: rows, reader, schema, plan, the merge to the settings of a run | files rig control plant_sim driver runtime experiment"
   "guardian | the guard of the outputs and its companions, the lease and the own guardian as a run sees them, the program abs_guardian | cli files rig control plant_sim driver runtime experiment lcmtypes telemetry config"
   "run | one run, put together from its settings in one place: driver, faults, plan, logic, gate, ring, metrics, in real time, in virtual time or cycle by cycle | files rig control plant_sim driver driver_sim runtime experiment analysis config"
-  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis run_folder config run"
+  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis version run_folder config run"
   "commands | remote commands over LCM: authority, listener, sender | files rig control plant_sim driver runtime experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment analysis config run telemetry lcmtypes"
   "interchange | what other tools bring or take: controllers from shared libraries, FMUs and agents, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
-  "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run study commands replay interchange"
+  "program | what `abs_hil` decides between its command line and the other rooms | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run study commands replay interchange"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,

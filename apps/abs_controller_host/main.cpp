@@ -5,8 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <string_view>
 
 #include "interchange/host.hpp"
+#include "version/build_facts.hpp"
 
 namespace {
 std::uint64_t allocations = 0;
@@ -34,7 +36,10 @@ void* realloc(void* block, std::size_t size) {
 }
 #endif
 
-int main() {
+int main(int argc, char** argv) {
+  if (argc == 2 && argv[1] == std::string_view("--version")) {
+    return std::puts(abs_hil::version::version_line("abs_controller_host").c_str()) < 0 ? 1 : 0;
+  }
   if (::fcntl(abs_hil::interchange::host_socket, F_GETFD) < 0) {
     std::fputs("abs_controller_host: abs_hil starts this program by itself, for --controller FILE\n", stderr);
     return 2;

@@ -36,6 +36,7 @@ struct EmulatorOptions {
   std::vector<std::string> when_braking{};  ///< commands of the USB board, obeyed once the brake has acted for 0.3 s
   std::uint64_t seed{1};
   bool lock_step{false};
+  bool unmarked{false};        ///< carries no emulator's mark: programs take it for a real board
   std::string truth_file{};    ///< CSV of true values that no register or frame shows; empty: none
   std::string traffic_file{};  ///< log of every register access to the card; empty: none
   // Where the board is.
@@ -46,6 +47,7 @@ struct EmulatorOptions {
   std::string hm2_address{};                                   ///< ADDRESS or ADDRESS:PORT, of a 7I92T
   std::string node_address{};                                  ///< the same of the node of docs/node.md
   std::string mac{};                                           ///< "00:60:1b:16:ab:50"; empty: the default
+  std::vector<std::string> wrong_words{};                      ///< "0x458=0x01010204", of the 7I92T's description
   // What the card's folder shows.
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string vendor{"0x10b5"};

@@ -73,6 +73,7 @@ class EmulatedCard final : public EmulatedBoard {
   explicit EmulatedCard(const EmulatorOptions& options)
       : model_(options.card),
         faulty_(model_, options.seed),
+        marked_(!options.unmarked),
         time_(options.lock_step, options.truth_file, true),
         root_(options.pci_root),
         folders_(options.bdfs),
@@ -166,6 +167,10 @@ class EmulatedCard final : public EmulatedBoard {
       std::memcpy(data, &time_ns, sizeof time_ns);
       return sizeof time_ns;
     }
+    if (marked_ && offset == 0 && size == driver::pci::emulator_mark.size()) {
+      std::memcpy(data, driver::pci::emulator_mark.data(), size);
+      return static_cast<int>(size);
+    }
     // The kernel splits other sizes into 1- and 2-byte port accesses, which the card does not have.
     if (size != sizeof(std::uint32_t) || offset % 4 != 0 || offset >= emulator::CardModel::bytes) return -EINVAL;
     catch_up();
@@ -224,6 +229,7 @@ class EmulatedCard final : public EmulatedBoard {
   emulator::FaultyCard faulty_;
   bool present_{true};
   bool permission_denied_{false};
+  bool marked_;
   BoardTime time_;
   OutputFile traffic_{};
   OutputFile changes_{};

@@ -53,15 +53,14 @@ sockaddr_in address_in(const std::string& text) {
 }
 
 std::array<std::uint8_t, 6> mac_in(const std::string& text) {
-  std::array<unsigned, 6> m{};
+  std::array<std::uint8_t, 6> m{};
   int used = 0;
-  if (std::sscanf(text.c_str(), "%2x:%2x:%2x:%2x:%2x:%2x%n", &m[0], &m[1], &m[2], &m[3], &m[4], &m[5], &used) != 6 ||
+  if (std::sscanf(text.c_str(), "%2hhx:%2hhx:%2hhx:%2hhx:%2hhx:%2hhx%n", &m[0], &m[1], &m[2], &m[3], &m[4], &m[5],
+                  &used) != 6 ||
       used != static_cast<int>(text.size())) {
     throw std::invalid_argument("--mac " + text + ": give six bytes, for example 00:60:1b:16:ab:50");
   }
-  std::array<std::uint8_t, 6> mac{};
-  std::ranges::transform(m, mac.begin(), [](unsigned byte) { return static_cast<std::uint8_t>(byte); });
-  return mac;
+  return m;
 }
 
 bool is_node(const EmulatorOptions& options) { return !options.node_address.empty(); }
@@ -72,15 +71,22 @@ emulator::Hm2Options board_options(const EmulatorOptions& options, const sockadd
   board.start_speed_rad_s = options.card.start_speed_rad_s;
   board.enable_pin = options.usb.enable_line;
   board.lock_step = options.lock_step;
+  board.marked = !options.unmarked;
   if (board.name.empty()) board.name = is_node(options) ? "abs-node" : "7I92T";
   std::memcpy(board.address.data(), &address.sin_addr, board.address.size());
   if (!options.mac.empty()) board.mac = mac_in(options.mac);
-  const int most = is_node(options) ? 0 : 33;
-  if (board.enable_pin < -1 || board.enable_pin > most) {
-    throw std::invalid_argument(fmt::format("--enable-line {}: {}; -1: none", board.enable_pin,
-                                            is_node(options) ? "the node has output 0 alone" : "give an I/O, 0 to 33"));
+  if (is_node(options) && board.enable_pin > 0)
+    throw std::invalid_argument("--enable-line: the node has output 0 alone");
+  for (const std::string& text : options.wrong_words) {
+    unsigned place = 0, value = 0;
+    int used = 0;
+    if (std::sscanf(text.c_str(), "%x=%x%n", &place, &value, &used) != 2 || used != static_cast<int>(text.size()) ||
+        place < 0x100 || place > 0x7FC || place % 4 != 0) {
+      throw std::invalid_argument("--wrong-board " + text + ": give a word from 0x100 to 0x7fc and its value");
+    }
+    board.words.emplace_back(static_cast<std::uint16_t>(place), value);
   }
-  if (is_node(options) && (!board.lie.empty() || board.active_high_stage)) {
+  if (is_node(options) && (!board.words.empty() || board.active_high_stage)) {
     throw std::invalid_argument("--wrong-board and --active-high are of the 7I92T, not of the node; give --hm2");
   }
   return board;

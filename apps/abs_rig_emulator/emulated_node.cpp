@@ -139,6 +139,7 @@ class EmulatedNode final : public EmulatedBoard {
                  .start_speed_rad_s = options.card.start_speed_rad_s,
                  .watchdog_ms = options.watchdog_ms,
                  .lock_step = options.lock_step,
+                 .marked = !options.unmarked,
                  .can_fd = bus_.can_fd(),
                  .supply_min_V = options.card.supply_min_V,
                  .temperature_max_C = static_cast<double>(options.card.temperature_max_C),

@@ -46,6 +46,12 @@ emulator::UsbBoardOptions board_options(const EmulatorOptions& options) {
   return board;
 }
 
+emulator::UsbIdentity identity_of(const EmulatorOptions& options) {
+  emulator::UsbIdentity identity = options.identity;
+  if (options.unmarked) identity.product = "RT-DAC/USB2";
+  return identity;
+}
+
 /// The board, plugged into this computer's virtual USB host controller (vhci_hcd) through a socket pair.
 class EmulatedUsb final : public EmulatedBoard {
  public:
@@ -53,7 +59,7 @@ class EmulatedUsb final : public EmulatedBoard {
   explicit EmulatedUsb(const EmulatorOptions& options)
       : options_(options),
         board_(board_options(options)),
-        device_(board_, options.identity, options.seed,
+        device_(board_, identity_of(options), options.seed,
                 options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
                                   : emulator::UsbipDevice::GoOnTo()),
         time_(options.lock_step, options.truth_file) {

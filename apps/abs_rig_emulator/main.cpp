@@ -23,6 +23,7 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "control.hpp"
+#include "version/build_facts.hpp"
 
 namespace {
 
@@ -79,7 +80,9 @@ void add_hm2_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
   plain(parser, "--board-name", &emulator.hm2.name,
         "name that the 7I92T or the node reports, for example 7I92 [7I92T, abs-node]");
   plain(parser, "--mac", &emulator.mac, "MAC address in the EEPROM of the 7I92T or the node: 00:60:1b:16:ab:50");
-  parser.add("--wrong-board", &emulator.hm2.lie, "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies());
+  parser.add("--wrong-board", &emulator.wrong_words,
+             "a word of the 7I92T's description that is another one: 0x458=0x01010204 leaves it one counter",
+             {.type = "ADDRESS=VALUE", .repeated = true});
   plain(parser, "--active-high", &emulator.hm2.active_high_stage,
         "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM");
 }
@@ -109,6 +112,8 @@ void add_options(cli::Parser& parser, Arguments& a) {
   parser.add("--set", &a.assignments, "any plant value, for example plant.theta_N=30", {.repeated = true});
   shown(parser, "--seed", &a.emulator.seed, "seed of intermittent faults and garbage");
   plain(parser, "--lock-step", &a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
+  parser.add("--unmarked", &a.emulator.unmarked, "carry no emulator's mark: programs take it for a real board",
+             {.excludes = {"--lock-step"}});
   parser.add("--fault", &a.faults, "fault of one register from the start, for example 88:stuck", {.repeated = true});
   parser.add("--command", &a.commands, "any control command, obeyed at the start", {.repeated = true});
   plain(parser, "--control", &a.control_fifo, "FIFO from which to take commands while running; created if missing");
@@ -199,6 +204,7 @@ int run(int argc, char** argv) {
   // Without a name of its own: its help begins with the path that the user typed.
   cli::Parser parser("",
                      "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node, RT-DAC/USB2 or Mesa 7I92T");
+  parser.set_version(version::version_line("abs_rig_emulator"));
   Arguments arguments;
   add_options(parser, arguments);
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;

@@ -29,9 +29,14 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *,
     try:
         _core.write_result(os.fsencode(path), into, probe)
     except OSError as error:
-        fix = ('free some space on that file system, or choose another' if error.errno in (errno.ENOSPC, errno.EDQUOT) else
-               'give a path in an existing, writable directory')
-        raise ValueError(f'cannot write "{path}": {error.strerror}; {fix}' if error.strerror else str(error)) from None
+        raise ValueError(f'cannot write "{path}": {refusal(error, path)}' if error.strerror else str(error)) from None
+
+
+def refusal(error: OSError, place: object = None, deed: str = 'write') -> str:
+    """The system's words with a fix for a person (src/rig/error_words.cpp). deed: 'write', 'read' or 'reach'."""
+    if not error.errno or error.errno < 0:  # as of a name that no server knows
+        return error.strerror or str(error)
+    return _core.refusal(error.errno, str(error.filename or '' if place is None else place), deed)
 
 
 def read_text(path: pathlib.Path) -> str:
@@ -48,7 +53,7 @@ def make_folder(folder: pathlib.Path, option: str) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ValueError(f'{option} "{folder}" cannot be made: {error.strerror}; give a folder in a writable one') from None
+        raise ValueError(f'{option} "{folder}" cannot be made: {refusal(error, folder)}') from None
 
 
 def refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
 from .core import _core, load_network
+from .files import refusal
 from .places import misfit
 
 #: a configuration value as Python has it
@@ -33,6 +34,8 @@ def failed(name: str, error: object, status: int = 2) -> int:
     """Says why a program ends; its exit status."""
     if isinstance(error, Exception) and (missing := misfit(error)):  # some packages are imported only where they are needed
         error, status = missing, 3
+    if isinstance(error, OSError) and error.filename:
+        error = f'{error.filename}: {refusal(error, deed="reach")}'
     print(f'{name}: {error}', file=sys.stderr)
     return status
 

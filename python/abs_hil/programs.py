@@ -8,6 +8,7 @@ import io
 import os
 import pathlib
 import sys
+from typing import Any
 
 from . import parsers
 from .places import misfit
@@ -31,15 +32,18 @@ def _plainly(error: UnicodeError) -> tuple[bytes, int]:
     return b''.join(bytes([ord(c) & 0xFF]) if '\udc80' <= c <= '\udcff' else _PLAIN.get(c, b'?') for c in lacking), error.end
 
 
-class _Stdout(io.FileIO):
-    """Standard output that remembers why it could not be written."""
+class _Output(io.FileIO):
+    """Standard output or error that remembers why it could not be written."""
     problem: OSError | None = None
+    endless = False  #: the program goes on until nobody reads; any other ends its work, for its files
 
-    def write(self, data: object) -> int:
+    def write(self, data: Any) -> int:
         try:
-            return super().write(data)  # type: ignore[arg-type, return-value]
+            return super().write(data) or 0
         except OSError as error:
             self.problem = error
+            if error.errno == errno.EPIPE and not self.endless:
+                return len(data)
             raise
 
 
@@ -51,10 +55,13 @@ def start(name: str, arguments: list[str]) -> int:
         except OSError:
             os.open(os.devnull, os.O_RDWR)
     sys.stdout, sys.stderr = (stream or open(os.devnull, 'w', encoding='utf-8') for stream in (sys.stdout, sys.stderr))
-    raw = _Stdout(1, 'wb', closefd=False)
+    raw = _Output(1, 'wb', closefd=False)
+    raw.endless = name == 'watch'
     codecs.register_error('abs_hil', _plainly)
     sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors='abs_hil',
                                   line_buffering=bool(sys.stdout.line_buffering))
+    sys.stderr = io.TextIOWrapper(io.BufferedWriter(_Output(2, 'wb', closefd=False)), encoding=sys.stderr.encoding,
+                                  errors='backslashreplace', line_buffering=True)
     status = _start(name, arguments)
     with contextlib.suppress(OSError):
         sys.stdout.flush()

@@ -25,6 +25,7 @@
 #include "column_sink.hpp"
 #include "files/result_file.hpp"
 #include "rig/clean_text.hpp"
+#include "rig/error_words.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
@@ -251,6 +252,13 @@ py::tuple profile_of(const std::string& text, const std::string& key) {
 void add_files(py::module_& module) {
   module.def(
       "check_seal", [](const std::string& folder) { run_folder::check_seal(folder); }, py::arg("folder"));
+  module.def(
+      "refusal",
+      [](int error, const std::string& place, const std::string& deed) {
+        const rig::Deed wanted = deed == "write" ? rig::writing : deed == "read" ? rig::reading : rig::reaching;
+        return rig::refusal(error, place, wanted);
+      },
+      py::arg("error"), py::arg("place"), py::arg("deed"));
   module.def("write_result", &write_result, py::arg("path"), py::arg("write"), py::arg("probe"));
   module.def("read_log", &read_log, py::arg("path"));
   module.def("read_log_facts", &read_log_facts, py::arg("path"));

@@ -14,6 +14,7 @@
 #include "files/result_file.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/event_log.hpp"
+#include "version/build_facts.hpp"
 
 namespace {
 
@@ -44,8 +45,8 @@ PYBIND11_MODULE(_core, module) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
   spdlog::set_level(spdlog::level::warn);
   spdlog::set_pattern("abs_hil: %l: %v");
-  module.attr("version") = ABS_HIL_VERSION;
-  module.attr("revision") = run_folder::build_facts().git_revision;
+  module.attr("version") = version::build_facts().version;
+  module.attr("revision") = version::build_facts().git_revision;
   module.def("set_config_dir", [](const std::string& folder) { config::set_own_config_dir(folder); });
   module.def("config_dir", [] { return config::config_dir().string(); });
   python::add_controllers(module);

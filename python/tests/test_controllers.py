@@ -1,15 +1,19 @@
 """Controllers in Python run through the program's own cycle; plant and laws can be stepped by hand."""
 import copy
+import inspect
 import math
+import pathlib
 import pickle
 import signal
+import subprocess
 import sys
 
 import numpy as np
 import pytest
-from conftest import QUICK
+from conftest import ABS_HIL, QUICK
 
 import abs_hil
+from abs_hil.interchange.host import made
 
 
 class Pi:
@@ -286,3 +290,49 @@ def test_law_by_hand():
         abs_hil.Controller('rely')
     with pytest.raises(ValueError, match='at most 8'):
         abs_hil.SlipOutput(1.0, signals=[0.0] * 9)
+
+
+LAW = ('class Law:\n    def reset(self, input): pass\n'
+       '    def step(self, input): return 4.0 + 60.0 * (input.slip_ref - input.slip)\n')
+
+
+@pytest.mark.parametrize('name', ['test', 'code', 'random', 'signal', 'json', 'numpy', 'abs_hil', 'errno', 'own'])
+def test_a_module_of_this_folder_is_taken_whatever_its_name(tmp_path, monkeypatch, name):
+    """Python's own module of that name, and what imports it, stay as they are."""
+    monkeypatch.chdir(tmp_path)
+    before = dict(sys.modules)
+    (tmp_path / f'{name}.py').write_text('import random\nimport numpy\nrandom.Random(), numpy.zeros(1)\n' + LAW)
+    law = made(f'{name}:Law')
+    assert pathlib.Path(inspect.getfile(type(law))) == tmp_path / f'{name}.py'
+    assert type(made(f'{name}:Law')) is type(law)
+    assert all(sys.modules[module] is before[module] for module in before)
+    with pytest.raises(ValueError, match=f'{tmp_path}/{name}.py'):
+        made(f'{name}:Other')
+    (tmp_path / f'{name}.py').unlink()
+    for module in set(sys.modules) - set(before):
+        del sys.modules[module]
+
+
+def test_packages_and_helpers_of_this_folder_are_taken(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = dict(sys.modules)
+    (tmp_path / 'test').mkdir()
+    (tmp_path / 'test/__init__.py').write_text('')
+    (tmp_path / 'test/laws.py').write_text('from . import gains\nimport helper_of_law\n' + LAW)
+    (tmp_path / 'test/gains.py').write_text('K = 3\n')
+    (tmp_path / 'helper_of_law.py').write_text('')
+    assert pathlib.Path(inspect.getfile(type(made('test.laws:Law')))) == tmp_path / 'test/laws.py'
+    (tmp_path / 'code.py').write_text('import nothing_of_this_name\n')
+    for _ in range(2):  # a module that failed is no module the second time
+        with pytest.raises(ValueError, match='No module named .nothing_of_this_name'):
+            made('code:Law')
+    for module in set(sys.modules) - set(before):
+        del sys.modules[module]
+
+
+@pytest.mark.parametrize('name', ['test', 'code'])
+def test_the_program_takes_a_module_of_its_folder(tmp_path, name):
+    (tmp_path / f'{name}.py').write_text(LAW)
+    result = subprocess.run([ABS_HIL.resolve(), '--fast', '--no-lcm', '--no-out', '--controller', f'{name}:Law', '--set',
+                             'experiment.start_speed_rad_s=170'], cwd=tmp_path, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr

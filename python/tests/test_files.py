@@ -1,4 +1,5 @@
 """Results of the Python programs are whole or absent, and never take the place of what is no regular file."""
+import errno
 import hashlib
 import os
 import pathlib
@@ -11,7 +12,7 @@ import pytest
 
 import abs_hil
 from abs_hil.core import _core
-from abs_hil.files import write_text, write_whole
+from abs_hil.files import refusal, write_text, write_whole
 from abs_hil.programs import _plainly
 
 LONG = 'n' * 300
@@ -101,12 +102,34 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
             result = subprocess.run(command(*words), stdout=full, stderr=subprocess.PIPE, text=True)
         assert result.returncode == 1 and 'cannot write to standard output' in result.stderr, result
         assert result.stderr.count('\n') == 1, result
-    for export in ('--csv', '--json', '--octave'):
+    made = tmp_path / 'made'
+    for words in (('report', '--csv', tmp_path / 'run'), ('report', '--json', tmp_path / 'run'), ('report', '--octave', tmp_path / 'run'),
+                  ('report', '--table', tmp_path / 'run'), ('report', '--help'), ('report', '--output', made, tmp_path / 'run'),
+                  ('rig', '--out', made), ('export-fmu', '--out', f'{made}.fmu'), ('tune', '--help')):
         nobody, out = os.pipe()
         os.close(nobody)
-        result = subprocess.run(command('report', export, tmp_path / 'run'), stdout=out, stderr=subprocess.PIPE, text=True)
+        result = subprocess.run(command(*words), stdout=out, stderr=subprocess.PIPE, text=True)
         os.close(out)
         assert (result.returncode, result.stderr) == (0, ''), result
+        assert '--out' not in ' '.join(map(str, words)) or any(tmp_path.glob('made*'))  # the work is done
+        made.unlink(missing_ok=True)
+
+
+def test_the_status_is_told_although_nobody_reads_why(tmp_path):
+    nobody, out = os.pipe()
+    os.close(nobody)
+    result = subprocess.run(command('report', tmp_path / 'nowhere'), stdout=out, stderr=out)
+    os.close(out)
+    assert result.returncode == 2
+
+
+def test_an_error_of_the_system_has_its_fix(tmp_path):
+    for number, deed, words in ((errno.ENOSPC, 'write', 'free some space'), (errno.EACCES, 'read', 'ls -l'),
+                                (errno.EADDRINUSE, 'reach', 'another program listens there')):
+        text = refusal(OSError(number, os.strerror(number), 'the/place'), deed=deed)
+        assert text.startswith(f'{os.strerror(number)}; ') and words in text
+    with pytest.raises(ValueError, match='Not a directory; a part of the path is a file'):
+        write_text(pathlib.Path('/dev/null/x'), 'words')
 
 
 def test_a_closed_output_is_as_dev_null(tmp_path, abs_hil_program):

@@ -419,7 +419,7 @@ def test_readings_that_the_rig_marks_as_lost_are_left_out():
     (['--fix', 'J2_kg_m2=-1'], r'--fix J2_kg_m2 = -1 is not valid; give a number in'),
     (['--fix', 'r2_m=inf'], r'--fix r2_m = inf is not valid; give a number in'),
     (['--validate', 'nosuch'], 'nosuch'),
-    (['--out', '/proc/nosuch/out'], '--out "/proc/nosuch/out" cannot be made: .*; give a folder'),
+    (['--out', '/proc/nosuch/out'], '--out "/proc/nosuch/out" cannot be made: .*; create'),
 ])
 def test_the_program_refuses_what_it_is_told_before_it_works(logs, tmp_path, monkeypatch, capsys, given, words):
     monkeypatch.chdir(tmp_path)

@@ -2,6 +2,7 @@
 #include "cli/command_line.hpp"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -9,7 +10,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
+#include <sstream>
 #include <type_traits>
 
 #include "rig/error_words.hpp"
@@ -33,9 +36,21 @@ std::string refuse_infinite(const std::string& text) {
                                                                          : std::string();
 }
 
+/// A file whose name promises another format than `type`, "FILE.csv" or "DIR", has.
+std::string refuse_ending(const std::string& path, const std::string& type) {
+  for (const char* format : {".csv", ".json", ".html", ".lcmlog", ".mcap", ".parquet", ".pdf", ".svg", ".png", ".md",
+                             ".toml", ".mat", ".fmu", ".xlsx", ".txt"}) {
+    if (path.ends_with(format) && type.find(format) == std::string::npos) return path + ": give " + type;
+  }
+  return {};
+}
+
 void limit_values(CLI::Option& option, const Target& to, const Option& row) {
   const bool real = std::holds_alternative<double*>(to);
   if (real) option.check(refuse_infinite, "");
+  if (row.type == "DIR" || row.type.find("FILE.") != std::string::npos) {
+    option.check([type = row.type](const std::string& path) { return refuse_ending(path, type); }, "");
+  }
   const auto [least, most] = row.range;
   if (least < most) {
     option.check(real ? CLI::Range(least, most) : CLI::Range(static_cast<int>(least), static_cast<int>(most)));
@@ -49,8 +64,41 @@ void limit_values(CLI::Option& option, const Target& to, const Option& row) {
   }
 }
 
+/// As argparse has it: COLUMNS, or those of the terminal, or 80.
+std::size_t columns() {
+  const char* given = std::getenv("COLUMNS");
+  int columns = given == nullptr ? 0 : rig::parse_number<int>(given).value_or(0);
+  winsize terminal{};
+  if (columns <= 0 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &terminal) == 0) columns = terminal.ws_col;
+  constexpr int usual = 80;
+  constexpr int least = 40;
+  return static_cast<std::size_t>(columns <= 0 ? usual : std::max(columns, least));
+}
+
+/// Breaks long lines between words. The rest goes below the text of its row, which stands after two spaces.
+std::string wrapped(const std::string& text) {
+  const std::size_t width = columns();
+  std::istringstream lines(text);
+  std::string out;
+  for (std::string line; std::getline(lines, line); out += line + '\n') {
+    const std::size_t gap = line.rfind("  ");
+    const std::size_t row = gap == std::string::npos ? 0 : gap + 2;
+    const std::size_t indent = row <= width / 2 ? row : line.find_first_not_of(' ') + 4;
+    while (line.size() > width) {
+      std::size_t cut = line.rfind(' ', width);
+      if (cut == std::string::npos || cut < line.find_first_not_of(' ')) cut = line.find(' ', width);
+      if (cut == std::string::npos) break;
+      out += line.substr(0, cut) + '\n';
+      line.erase(0, cut + 1);
+      const std::size_t word = std::min(line.find(' '), line.size());  // a long one begins further left
+      line.insert(0, std::min(indent, width - std::min(word, width)), ' ');
+    }
+  }
+  return out;
+}
+
 /// The first word that the command line should not have, and the valid one that is nearest to it.
-std::string unexpected(const CLI::App& program) {
+std::string unexpected(const CLI::App& program, const std::map<std::string, std::string>& explained) {
   const CLI::App* app = &program;
   while (app->remaining().empty() && !app->get_subcommands().empty()) app = app->get_subcommands().front();
   std::string word = app->remaining().front();
@@ -65,6 +113,7 @@ std::string unexpected(const CLI::App& program) {
   if (word.find_first_of("=.0123456789") == 0) {
     return "unexpected word " + word + ": write key=value without spaces, or in quotes";
   }
+  if (const auto why = explained.find(word); why != explained.end()) return why->second;
   for (const CLI::App* subcommand : app->get_subcommands({})) {
     if (!subcommand->get_name().empty()) names.push_back(subcommand->get_name());
   }
@@ -74,7 +123,11 @@ std::string unexpected(const CLI::App& program) {
 
 }  // namespace
 
-Parser::Parser(std::string name, const std::string& help) : app_(std::make_shared<CLI::App>(help, std::move(name))) {}
+Parser::Parser(std::string name, const std::string& help) : app_(std::make_shared<CLI::App>(help, std::move(name))) {
+  app_->formatter_fn([](const CLI::App* app, const std::string& called, CLI::AppFormatMode mode) {
+    return wrapped(CLI::Formatter().make_help(app, called, mode));
+  });
+}
 
 void Parser::add(const std::string& names, const Target& to, const std::string& help, const Option& row) {
   const auto bind = [&](auto* target) {
@@ -92,13 +145,14 @@ void Parser::add(const std::string& names, const Target& to, const std::string& 
   if (row.required) option.required();
   if (row.show_default) option.capture_default_str();
   if (!row.default_text.empty()) option.default_str(row.default_text);
-  for (const std::string& other : row.needs) option.needs(other);
   for (const std::string& other : row.excludes) option.excludes(other);
 }
 
 void Parser::set_version(const std::string& version) { app_->set_version_flag("--version", version); }
 
 void Parser::set_footer(const std::string& footer) { app_->footer(footer); }
+
+void Parser::explain(const std::string& word, const std::string& why) { explained_[word] = why; }
 
 Parser Parser::add_subcommand(const std::string& name, const std::string& help) {
   app_->require_subcommand(0, 1);
@@ -117,9 +171,11 @@ std::optional<int> Parser::parse(int argc, const char* const* argv) {
     app_->parse(argc, argv);
     return std::nullopt;
   } catch (const CLI::ExtrasError& error) {
-    return named ? refuse(unexpected(*app_)) : app_->exit(error) == 0 ? 0 : usage_error;
+    return named ? refuse(unexpected(*app_, explained_)) : app_->exit(error) == 0 ? 0 : usage_error;
   } catch (const CLI::ParseError& error) {
     if (named && error.get_exit_code() != 0) return refuse(error.what());
+    // The help of something else would pass for that of the unknown word.
+    if (named && !app_->remaining(true).empty()) return refuse(unexpected(*app_, explained_));
     return app_->exit(error) == 0 ? 0 : usage_error;
   }
 }

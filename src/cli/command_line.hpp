@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,7 +49,7 @@ struct Count {
 /// What more there is to say of an option.
 struct Option {
   bool sets{true};                      ///< the value that a flag gives its target
-  std::string type{};                   ///< name of the value in the help; empty: that of its type
+  std::string type{};                   ///< name of the value in the help; "FILE.csv", "DIR": its ending must fit
   Range range{};                        ///< of integers unless the target is a double
   std::vector<std::string> one_of{};    ///< valid values; empty: any
   Count count{};                        ///< of values
@@ -56,7 +57,6 @@ struct Option {
   bool required{false};                 ///< the command line must have it
   bool show_default{false};             ///< the help shows the target's value at this moment
   std::string default_text{};           ///< the help shows this as the default
-  std::vector<std::string> needs{};     ///< names of options that must be given with it
   std::vector<std::string> excludes{};  ///< names of options that must not
 };
 
@@ -68,7 +68,7 @@ class Parser {
   /// Knows --help. Without a name the program is called what the user typed, and its errors are in CLI11's own form.
   Parser(std::string name, const std::string& help);
 
-  /// Adds an option. Those that it needs or excludes come first. Throws std::exception for an invalid row.
+  /// Adds an option. Those that it excludes come first. Throws std::exception for an invalid row.
   /// @param names  "--rate" or "-r,--rate"; without dashes, an argument known by its place
   /// @param to  a bool makes the option a flag, which takes no value
   void add(const std::string& names, const Target& to, const std::string& help, const Option& row = {});
@@ -76,6 +76,8 @@ class Parser {
   void set_version(const std::string& version);
   /// Sets the last lines of the help.
   void set_footer(const std::string& footer);
+  /// An error that says `why`, in place of "unknown subcommand", for a word that people try.
+  void explain(const std::string& word, const std::string& why);
   /// Adds a subcommand; a command line may have one.
   [[nodiscard]] Parser add_subcommand(const std::string& name, const std::string& help);
   /// Adds a group of options, of which a command line must have as many as `count` says.
@@ -95,6 +97,7 @@ class Parser {
   explicit Parser(std::shared_ptr<CLI::App> app) : app_(std::move(app)) {}
 
   std::shared_ptr<CLI::App> app_{};
+  std::map<std::string, std::string> explained_{};
 };
 
 /// Writes to stdout or stderr. Never throws, since a reader such as `head` may end early; with_stdout tells lost

@@ -16,19 +16,12 @@ namespace abs_hil::config {
 
 namespace {
 
-/// What the options lead to. A kind that no backend has counts as hardware.
-driver::BoardReality reality(const driver::DriverOptions& d) {
-  if (driver::is_known(d.kind)) return driver::reality_of(d);
-  return {.reality = driver::Reality::hardware, .option = "driver.kind = " + d.kind, .is = "is no known board"};
-}
-
-bool is_certainly_real(const driver::BoardReality& board) { return board.reality == driver::Reality::hardware; }
-
 void refuse_virtual_time_on_hardware(const Settings& s, bool virtual_time) {
   if (!virtual_time || s.driver.emulated) return;
   throw std::invalid_argument(
-      "--fast: the rig runs in real time only; leave it out, use --backend sim, or, for an emulator in lock-step "
-      "(never for hardware), --set driver.emulated=true");
+      "--fast: a real board runs in real time only, and none that carries an emulator's mark answers; leave it out, "
+      "use "
+      "--backend sim, or start abs_rig_emulator with --lock-step");
 }
 
 void refuse_start_speed(const Settings& s) {
@@ -51,35 +44,18 @@ void refuse_unfit_options(const Settings& s, bool virtual_time) {
 void refuse_injection_into_hardware(const Settings& s) {
   const std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
   if (injections.empty()) return;
-  const driver::DriverOptions& d = s.driver;
-  const std::string fault = driver::to_text(injections.front());
-  if (!d.emulated) {
-    throw std::invalid_argument(
-        fmt::format("--inject {}: faults are never injected into real hardware; use --backend sim, or for an emulator "
-                    "(never hardware) --set driver.emulated=true",
-                    fault));
-  }
-  if (const driver::BoardReality board = reality(d); is_certainly_real(board)) {
-    throw std::invalid_argument(
-        fmt::format("--inject {}: driver.emulated=true, but {} {}", fault, board.option, board.is));
-  }
+  if (s.driver.emulated) return;
+  throw std::invalid_argument(
+      fmt::format("--inject {}: faults are never injected into real hardware, and no board that carries an emulator's "
+                  "mark answers; use --backend sim, or start abs_rig_emulator",
+                  driver::to_text(injections.front())));
 }
 
 void refuse_hardware_without_guardian(const Settings& s) {
-  if (s.guardian.enabled) return;
-  const driver::DriverOptions& d = s.driver;
-  if (d.emulated) {
-    const driver::BoardReality board = reality(d);
-    if (!is_certainly_real(board)) return;
-    throw std::invalid_argument(fmt::format(
-        "guardian.enabled = false: driver.emulated=true, but {} is real hardware, and real hardware needs a "
-        "guardian; leave guardian.enabled out, or name the emulator's",
-        board.option));
-  }
+  if (s.guardian.enabled || s.driver.emulated) return;
   throw std::invalid_argument(
       "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold when the program dies; leave "
-      "it "
-      "out, or for an emulator (never hardware) --set driver.emulated=true");
+      "it out; only a board that carries an emulator's mark runs without");
 }
 
 /// Silence of a single late cycle must not end a run.
@@ -156,9 +132,16 @@ void lower_cap(double& cap, std::string_view key, double board_cap, std::string_
 
 }  // namespace
 
-bool is_real_board(const driver::DriverOptions& driver) {
-  const driver::BoardReality board = reality(driver);
-  return board.reality == driver::Reality::unknown ? !driver.emulated : is_certainly_real(board);
+void learn_reality(driver::DriverOptions& d) {
+  if (!driver::is_known(d.kind)) return;  // refused where its caps are needed
+  const driver::BoardReality board = driver::reality_of(d);
+  if (board.reality == driver::Reality::hardware && d.emulated) {
+    throw std::invalid_argument(fmt::format(
+        "driver.emulated = true demands an emulator, and the board does not carry the mark of one: {} {}. It counts as "
+        "real: remove driver.emulated",
+        board.option, board.is));
+  }
+  if (board.reality != driver::Reality::silent) d.emulated = board.reality == driver::Reality::emulator;
 }
 
 std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& keys, bool virtual_time) {

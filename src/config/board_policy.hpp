@@ -7,9 +7,18 @@
 
 namespace abs_hil::config {
 
-/// False for a board that is known to be an emulator: one whose files or interface are not the kernel's, or of which
-/// driver.emulated says so. Cards of the kernel and adapters of a real bus are real whatever driver.emulated says.
-[[nodiscard]] bool is_real_board(const driver::DriverOptions& driver);
+/// Asks the board what it is: it is real unless it carries an emulator's mark. `driver.emulated` becomes what it shows.
+/// A board that is silent keeps what somebody demands, because `configure` refuses one without the mark. Throws
+/// std::invalid_argument if driver.emulated demands an emulator and there is none, Unavailable if somebody drives it.
+void learn_reality(driver::DriverOptions& driver);
+
+/// True unless the board has shown an emulator's mark (`learn_reality`).
+[[nodiscard]] inline bool is_real_board(const driver::DriverOptions& driver) noexcept { return !driver.emulated; }
+
+/// What a run does not ask of an emulator, as a line for a person.
+inline constexpr const char* waived_for_emulator =
+    "the board carries an emulator's mark: no commissioning record, resident guardian or real time is required, and "
+    "weak limits, controllers from files and injected faults are allowed";
 
 /// Refuses what each key's own range allows and what must not reach a rig: virtual time, wheels that turn from the
 /// start, answers that take longer than a period, injected faults, no guardian, a guardian that would end a healthy

@@ -201,6 +201,7 @@ void fill(Settings& s, KeyTable& keys, const Sources& sources, const Said& said,
     s.inject += (s.inject.empty() ? "" : ",") + injection;
   }
   if (s.on_rig()) complete_identity(s, keys);
+  if (s.on_rig() && sources.asks_board) learn_reality(s.driver);
   s.realtime.mode = realtime_mode(sources.realtime, s);
 }
 

@@ -34,6 +34,7 @@ struct Sources {
   std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
   std::optional<std::string> realtime{};  ///< --rt; none: require on a real board, otherwise prefer
   bool virtual_time{false};               ///< as fast as possible, not in real time
+  bool asks_board{true};                  ///< for an emulator's mark; otherwise driver.emulated is believed
   /// A person or the simulation itself answers an experiment's questions if experiment.answers is auto.
   std::string answered_by{experiment::answers_itself};
 };

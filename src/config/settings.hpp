@@ -37,7 +37,7 @@ struct CommandOptions {
 struct GuardianOptions {
   ABS_HIL_OPTIONS(GuardianOptions);
   ABS_HIL_OPTION(bool, enabled, true,
-                 .meaning = "guardian: watchdog process beside a run on a board; off only with driver.emulated",
+                 .meaning = "guardian: watchdog process beside a run on a board; off only for an emulator",
                  .safety = rig::judged_elsewhere);
   ABS_HIL_OPTION(double, timeout_ms, 20.0, .unit = "ms",
                  .meaning = "time without a sign of life of the cycle after which the guardian acts",
@@ -82,6 +82,11 @@ struct UnsafeOptions {
                  .meaning =
                      "accept that code from a file, which no test of this project has seen, runs in the control cycle: "
                      "allows --controller FILE on a board",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
+  ABS_HIL_OPTION(bool, foreign_files, false,
+                 .meaning =
+                     "accept that a controller from a file could change the files of this user: allows --controller "
+                     "FILE where the kernel has no Landlock",
                  .safety = {.kind = rig::SafetyClass::Kind::consent});
   ABS_HIL_OPTION(std::string, keys, "",
                  .meaning =

@@ -165,6 +165,12 @@ class EmulatedTime {
   std::int64_t ahead_ns_{0};
 };
 
+/// Refuses a board without an emulator's mark where the run relies on one. Throws Unavailable.
+inline void require_mark(const std::string& board, bool emulated, bool marked) {
+  if (!emulated || marked) return;
+  refuse(board + " does not carry an emulator's mark: it counts as real. Remove driver.emulated, or name an emulator");
+}
+
 /// Refuses a board with its own time under --fast, and an emulator in lock-step without --fast. Throws Unavailable.
 /// @param board      how messages name it
 /// @param lock_step  the program advances the board's time
@@ -180,7 +186,7 @@ inline void require_lock_step(const std::string& board, bool lock_step, bool wai
   }
   if (!lock_step && waits) {
     refuse(board +
-           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
+           " is an emulator in lock-step: give --fast to advance its time, or start "
            "abs_rig_emulator without --lock-step");
   }
 }

@@ -109,7 +109,8 @@ std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& opt
 
 BoardReality reality_of(const DriverOptions& options) {
   const ChosenBackend chosen = chosen_backend(options);
-  return chosen.entry.reality ? chosen.entry.reality(chosen.options) : BoardReality{};
+  return chosen.entry.reality ? chosen.entry.reality(chosen.options)
+                              : BoardReality{.option = "driver.kind = " + options.kind, .is = "is a board"};
 }
 
 std::string verification_note(const DriverOptions& options) {

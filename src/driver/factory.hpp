@@ -43,9 +43,11 @@ struct DriverOptions {
   ABS_HIL_OPTIONS(DriverOptions);
   ABS_HIL_OPTION(std::string, kind, "pci", .meaning = "board behind --backend rig", .allowed = board_name,
                  .safety = rig::commissioned);
-  /// Refused where there is no emulator.
-  ABS_HIL_OPTION(bool, emulated, false, .meaning = "the board is an emulator: --fast may drive its time in lock-step",
-                 .safety = rig::judged_elsewhere);
+  /// After the merge: what the board has shown. Until then: what somebody demands.
+  ABS_HIL_OPTION(
+      bool, emulated, false,
+      .meaning = "demands an emulator: a board without an emulator's mark is refused; the mark itself sets it",
+      .safety = rig::judged_elsewhere);
   /// Until then doctor and log say otherwise.
   ABS_HIL_OPTION(bool, verified_on_hardware, false,
                  .meaning = "this lab has gone through docs/rig-setup.md on its own rig",
@@ -101,7 +103,7 @@ struct ChosenBackend {
 [[nodiscard]] std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options,
                                                                       bool beside_guardian = false);
 
-/// What the options of the chosen board lead to. Throws Unavailable for a kind that no backend has.
+/// Asks the chosen board what it is (BackendRow::reality). Throws Unavailable for a kind that no backend has.
 [[nodiscard]] BoardReality reality_of(const DriverOptions& options);
 
 /// The warning "not verified on hardware ..."; empty if `verified_on_hardware` is set.

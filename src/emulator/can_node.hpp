@@ -59,6 +59,7 @@ struct CanNodeOptions {
   double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
   std::uint16_t watchdog_ms{20};  ///< until an activation sets another value
   bool lock_step{false};          ///< only ABS_TIME advances the time
+  bool marked{true};              ///< its identity says that it is an emulator
   bool can_fd{true};              ///< answers a SYNC in an FD frame with an FD frame
   double supply_V{24.0};
   double supply_min_V{15.0};
@@ -286,7 +287,8 @@ class CanNode final : public RigBehind {
   void send_identity() {
     BusFrame frame{.id = 0x9A, .length = 8};
     frame.data[0] = 1;
-    frame.data[1] = static_cast<std::uint8_t>((options_.lock_step ? 1U : 0U) | (options_.can_fd ? 2U : 0U));
+    frame.data[1] = static_cast<std::uint8_t>((options_.lock_step ? 1U : 0U) | (options_.can_fd ? 2U : 0U) |
+                                              (options_.marked ? 4U : 0U));
     frame.put(2, 2, nonce_);
     frame.put(4, 2, options_.watchdog_ms);
     send(frame);

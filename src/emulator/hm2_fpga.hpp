@@ -28,9 +28,7 @@ class Hm2Fpga : public UdpBoard {
   static constexpr std::uint32_t clock_high_Hz = 200'000'000;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit Hm2Fpga(const Hm2Options& options) : UdpBoard(options), identity_(options.lie) {
-    check_pair("PWM generators", options.drive_pwm, options.brake_pwm);
-    check_pair("counters", options.lower_encoder, options.upper_encoder);
+  explicit Hm2Fpga(const Hm2Options& options) : UdpBoard(options), identity_(options.words) {
     if (options.enable_pin < -1 || options.enable_pin >= static_cast<std::int32_t>(port_count * pins_per_port)) {
       throw std::invalid_argument("enable pin " + std::to_string(options.enable_pin) + ": give -1 to 33");
     }
@@ -99,8 +97,7 @@ class Hm2Fpga : public UdpBoard {
       return options_.active_high_stage ? high_share(io) : 1.0 - high_share(io);
     };
     const bool enabled = options_.enable_pin < 0 || acting(static_cast<std::uint32_t>(options_.enable_pin)) > 0.5;
-    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : acting(options_.drive_pwm * pins_per_port + 1),
-            .brake_duty = acting(options_.brake_pwm * pins_per_port + 1)};
+    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : acting(1), .brake_duty = acting(pins_per_port + 1)};
   }
   [[nodiscard]] bool bitten() const noexcept override { return status_ != 0; }
   [[nodiscard]] bool drives_pins() const noexcept override {
@@ -156,11 +153,6 @@ class Hm2Fpga : public UdpBoard {
   static std::uint32_t bits_of(std::uint32_t mode) { return 9 + (mode & width_mask); }
   static std::uint32_t output_of(std::uint32_t mode) { return mode >> 3U & 3U; }
 
-  static void check_pair(const char* what, std::uint32_t a, std::uint32_t b) {
-    if (a < 2 && b < 2 && a != b) return;
-    throw std::invalid_argument(std::string(what) + " " + std::to_string(a) + " and " + std::to_string(b) +
-                                ": give 0 and 1, or 1 and 0");
-  }
   static constexpr std::uint32_t port_count = 2;
   static constexpr std::uint32_t pins_per_port = 17;
   static constexpr std::uint32_t disabled = 0x80000000;
@@ -328,9 +320,7 @@ class Hm2Fpga : public UdpBoard {
     }
     if (armed_ && time_ns() >= bites_ns_) bite();
   }
-  [[nodiscard]] Counter& counter_of(bool upper_wheel) noexcept {
-    return counters_[upper_wheel ? options_.upper_encoder : options_.lower_encoder];
-  }
+  [[nodiscard]] Counter& counter_of(bool upper_wheel) noexcept { return counters_[upper_wheel ? 1 : 0]; }
   /// Counts what a wheel has turned in a step in which its speed was constant, and finds the time of the last edge.
   void count(bool upper_wheel, double from_rad, double to_rad, std::int64_t from_ns, std::int64_t to_ns) noexcept {
     Counter& c = counter_of(upper_wheel);

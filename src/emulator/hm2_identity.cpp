@@ -1,8 +1,7 @@
-// What a 7I92 with firmware G540x2 says about itself, and the ways in which a wrong board differs from it.
+// What a 7I92 with firmware G540x2 says about itself.
 
 #include <algorithm>
 
-#include "emulator/fault_text.hpp"
 #include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {
@@ -13,7 +12,6 @@ constexpr std::uint32_t idrom = 0x400;
 constexpr std::uint32_t modules = 0x440;
 constexpr std::uint32_t pins = 0x600;
 constexpr std::uint32_t pin_count = 34;
-constexpr std::uint32_t module_words = 3;
 
 constexpr std::uint32_t text_word(const char (&four)[5]) {
   std::uint32_t word = 0;
@@ -28,8 +26,6 @@ constexpr std::array<std::uint32_t, 15> module_table{
     0x02010204, 0x00053000, 0x03,   // counters: version 2, 2 instances, count and control per counter
     0x02020006, 0x00054000, 0x03,   // PWM on ClockHigh: 2 instances, value and mode per generator
     0x01010080, 0x00010200, 0x00};  // LEDs
-constexpr std::uint32_t place_of_counters = 2;
-constexpr std::uint32_t place_of_pwm = 3;
 
 constexpr std::uint32_t pin(std::uint32_t number, std::uint32_t tag, std::uint32_t unit) {
   return 0x03000000U | unit << 16U | tag << 8U | number;
@@ -57,65 +53,10 @@ std::vector<std::uint32_t> stock_words() {
   return words;
 }
 
-std::uint32_t& at(Hm2Identity& board, std::uint32_t address) { return board.words[address / 4]; }
-/// The first word of a module's descriptor, or the one `word` words after it.
-std::uint32_t& module(Hm2Identity& board, std::uint32_t place, std::uint32_t word = 0) {
-  return board.words[modules / 4 + module_words * place + word];
-}
-void set_instances(Hm2Identity& board, std::uint32_t place, std::uint32_t instances) {
-  module(board, place) = (module(board, place) & 0x00FFFFFFU) | instances << 24U;
-}
-
-/// A lie about one thing, and what it changes.
-struct Lie {
-  std::string_view name;
-  void (*tell)(Hm2Identity&);
-};
-constexpr std::array<Lie, 22> lies_told{{
-    {"cookie", [](Hm2Identity& b) { at(b, 0x100) = 0x55AACAFF; }},
-    {"not-hostmot2", [](Hm2Identity& b) { at(b, 0x108) = text_word("MOT3"); }},
-    {"idrom-outside", [](Hm2Identity& b) { at(b, 0x10C) = 0xFFF0; }},
-    {"idrom-type", [](Hm2Identity& b) { at(b, idrom) = 9; }},
-    {"modules-outside", [](Hm2Identity& b) { at(b, idrom + 4) = 0xFFFF; }},
-    {"width", [](Hm2Identity& b) { at(b, idrom + 32) = 72; }},
-    {"port-width", [](Hm2Identity& b) { at(b, idrom + 36) = 40; }},
-    {"clock-zero", [](Hm2Identity& b) { at(b, idrom + 40) = at(b, idrom + 44) = 0; }},
-    {"strides", [](Hm2Identity& b) { at(b, idrom + 48) = at(b, idrom + 56) = 0; }},
-    {"no-watchdog", [](Hm2Identity& b) { module(b, 0) = 0x010100C3; }},
-    {"no-counters", [](Hm2Identity& b) { module(b, place_of_counters) = 0x020102C3; }},
-    {"no-pwm", [](Hm2Identity& b) { module(b, place_of_pwm) = 0x020200C3; }},
-    {"one-counter", [](Hm2Identity& b) { set_instances(b, place_of_counters, 1); }},
-    {"one-pwm", [](Hm2Identity& b) { set_instances(b, place_of_pwm, 1); }},
-    {"255-instances", [](Hm2Identity& b) { set_instances(b, place_of_pwm, 255); }},
-    {"base-outside", [](Hm2Identity& b) { module(b, place_of_counters, 1) |= 0xFFFC; }},
-    {"version", [](Hm2Identity& b) { module(b, place_of_pwm) |= 0x00000900U; }},
-    {"endless",
-     [](Hm2Identity& b) {
-       for (std::uint32_t a = modules + 60; a < pins; a += 4) at(b, a) = 0x010100C3;
-     }},
-    {"pins", [](Hm2Identity& b) { at(b, pins + 4) = at(b, pins + 4 * 18) = pin(0, 0, 0); }},
-    {"all-ones",
-     [](Hm2Identity& b) {
-       for (std::uint32_t a = 0x100; a < pins + 512; a += 4) at(b, a) = 0xFFFFFFFF;
-     }},
-    {"lbp-version", [](Hm2Identity& b) { b.lbp_version = 2; }},
-    {"firmware", [](Hm2Identity& b) { b.firmware_version = 3; }},
-}};
-
 }  // namespace
 
-std::string Hm2Identity::lies() {
-  std::string all;
-  for (const Lie& lie : lies_told) all.append(lie.name).append(" ");
-  all.pop_back();
-  return all;
-}
-
-Hm2Identity::Hm2Identity(std::string_view lie) : words(stock_words()) {
-  if (lie.empty()) return;
-  const auto told = std::ranges::find(lies_told, lie, &Lie::name);
-  if (told == lies_told.end()) refuse_fault(lie, "one of " + lies());
-  told->tell(*this);
+Hm2Identity::Hm2Identity(const Hm2Words& others) : words(stock_words()) {
+  for (const auto& [address, value] : others) words.at(address / 4) = value;
 }
 
 }  // namespace abs_hil::emulator

@@ -1,5 +1,5 @@
 // The core of the node's firmware in place of a chip: it gets the time, the encoders' counts and the datagrams, and its
-// duties act on the rig. In lock-step this file, not the core, answers space 5 (docs/hm2-emulator.md).
+// duties act on the rig. This file, not the core, answers space 5, the mark of an emulator (docs/hm2-emulator.md).
 
 #include <algorithm>
 #include <cstring>
@@ -15,8 +15,10 @@ namespace {
 constexpr unsigned advances_time = 0xD682;  // then 8 bytes, ns
 constexpr unsigned reads_time = 0x5682;
 constexpr unsigned reads_cookie = 0x7501;
+constexpr unsigned reads_facts = 0x7582;  // the cookie, then sizes: bit 15 says that it can be written
 constexpr std::size_t time_bytes = 8;
 constexpr std::array<std::uint8_t, 2> cookie{0x05, 0x5A};
+constexpr std::array<std::uint8_t, 2> written_in_lock_step{0x0F, 0x81};
 
 /// Calls `use` with each whole command's word, the place of its data, and the bytes of the answer before its own.
 template <typename Use>
@@ -53,7 +55,7 @@ class NodeBoard final : public UdpBoard {
     const bool was_latched = core_.latched;
     std::vector<std::uint8_t> reply(NODE_MOST_BYTES);
     reply.resize(node_datagram(&core_, now_us(), for_core.data(), for_core.size(), reply.data()));
-    if (options_.lock_step && !reply.empty()) answer_lock_step(datagram, reply);
+    if (options_.marked && !reply.empty()) answer_space_5(datagram, reply);
     bool writes = false;
     for_each_command(datagram, [&writes](unsigned word, std::size_t /*data_at*/, std::size_t /*answered*/) {
       constexpr unsigned write_and_space = 0x9C00;
@@ -82,8 +84,7 @@ class NodeBoard final : public UdpBoard {
   [[nodiscard]] Outputs outputs() const noexcept override {
     const auto duty = [this](std::uint32_t channel) { return node_duty(&core_, channel) / 4096.0; };
     const bool enabled = options_.enable_pin < 0 || node_output(&core_);
-    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(options_.drive_pwm),
-            .brake_duty = duty(options_.brake_pwm)};
+    return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(0), .brake_duty = duty(1)};
   }
   [[nodiscard]] bool bitten() const noexcept override { return core_.latched; }
   [[nodiscard]] bool drives_pins() const noexcept override { return node_drives(&core_, 0) || node_drives(&core_, 1); }
@@ -107,8 +108,9 @@ class NodeBoard final : public UdpBoard {
     note_outputs("power-on");
   }
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override {
-    if (!core_.armed) return next_ns;
-    const auto left_us = static_cast<std::int32_t>(core_.fed_us + core_.allowed_us - now_us());
+    if (!core_.armed && core_.latched) return next_ns;
+    const std::uint32_t most_us = core_.armed ? core_.allowed_us : NODE_LONGEST_US;
+    const auto left_us = static_cast<std::int32_t>(core_.fed_us + most_us - now_us());
     return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { look(); }
@@ -129,19 +131,21 @@ class NodeBoard final : public UdpBoard {
     return rest;
   }
   /// Puts what space 5 answers in place of the core's zeros.
-  void answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
+  void answer_space_5(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
     const std::int64_t now_ns = time_ns();
     for_each_command(datagram, [&](unsigned word, std::size_t /*data_at*/, std::size_t answered) {
-      if (word == reads_time) std::memcpy(reply.subspan(answered, time_bytes).data(), &now_ns, time_bytes);
-      if (word == reads_cookie)
+      if (word == reads_time && options_.lock_step)
+        std::memcpy(reply.subspan(answered, time_bytes).data(), &now_ns, time_bytes);
+      if (word == reads_cookie || word == reads_facts)
         std::memcpy(reply.subspan(answered, cookie.size()).data(), cookie.data(), cookie.size());
+      if (word == reads_facts && options_.lock_step)
+        std::memcpy(reply.subspan(answered + 2, 2).data(), written_in_lock_step.data(), 2);
     });
   }
   /// What the chip's loop does: counters, then the watchdog.
   void look() {
     for (const bool upper : {false, true}) {
-      node_count(&core_, upper ? options_.upper_encoder : options_.lower_encoder,
-                 static_cast<std::uint16_t>(position(upper)), now_us());
+      node_count(&core_, upper ? 1 : 0, static_cast<std::uint16_t>(position(upper)), now_us());
     }
     const bool was_latched = core_.latched;
     node_poll(&core_, now_us());

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "abs_hil/plant_sim/options.hpp"
@@ -17,34 +18,31 @@
 
 namespace abs_hil::emulator {
 
-/// Properties of the emulated Mesa 7I92T, of its wiring to the rig, and lies about itself.
+/// Words of a board's description by their addresses.
+using Hm2Words = std::vector<std::pair<std::uint16_t, std::uint32_t>>;
+
+/// Properties of the emulated Mesa 7I92T and of its wiring to the rig.
 struct Hm2Options {
   plant_sim::PlantOptions plant{};
   double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
   std::string name{"7I92T"};      ///< 1 to 16 characters
   std::array<std::uint8_t, 6> mac{0x00, 0x60, 0x1B, 0x16, 0xAB, 0x50};
   std::array<std::uint8_t, 4> address{192, 168, 1, 121};  ///< as EEPROM and mesaflash show it
-  std::uint32_t drive_pwm{0};                             ///< PWM generator wired to the drive, 0 or 1
-  std::uint32_t brake_pwm{1};
-  std::uint32_t lower_encoder{0};  ///< counter of the lower wheel, 0 or 1
-  std::uint32_t upper_encoder{1};
   std::int32_t enable_pin{-1};    ///< I/O that enables the drive with the stage's active level, 0 ... 33; -1: none
   bool active_high_stage{false};  ///< the power stages act while their pins are high: full PWM after a bite
   bool lock_step{false};          ///< only a write to space 5 advances the time
-  std::string lie{};              ///< name of a lie of `hm2_lies`; empty: none
+  Hm2Words words{};               ///< in place of those of its description: another firmware, or an impossible one
+  bool marked{true};              ///< space 5 gives its cookie: the mark of an emulator
 };
 
 /// The part of a HostMot2's registers that never changes: cookie, IDROM, module and pin descriptors of the firmware
 /// G540x2 on a 7I92.
 struct Hm2Identity {
-  /// Throws std::invalid_argument for an unknown lie.
-  explicit Hm2Identity(std::string_view lie = {});
+  explicit Hm2Identity(const Hm2Words& others = {});
 
   [[nodiscard]] std::uint32_t word(std::uint32_t address) const noexcept {
     return address / 4 < words.size() ? words[address / 4] : 0;
   }
-  /// All lies, separated by blanks.
-  [[nodiscard]] static std::string lies();
 
   std::vector<std::uint32_t> words;
   std::uint16_t lbp_version{3};  ///< that the board reports, as the next
@@ -99,8 +97,8 @@ inline constexpr std::size_t largest_hm2_answer = 1472;
 /// documents are silent this project chose: a command that the space does not take reads as zeros and counts as an
 /// error; a datagram that breaks off, or whose answer would not fit into a packet, is obeyed up to that command.
 ///
-/// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
-/// advances the time by a write of all 8 bytes.
+/// Space 5, which no hardware uses, is the mark of an emulator: its cookie is 0x5A05. In lock-step it can be written,
+/// and holds the board's time in ns (8 bytes, little-endian); a host advances the time by a write of all 8 bytes.
 /// Throws std::invalid_argument if an option is outside its range.
 [[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options);
 

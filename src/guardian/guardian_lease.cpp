@@ -70,8 +70,8 @@ std::string plain(const std::string& text) {
 }
 
 /// The end of a namespace's first process ends all others in it, the guardian too, before anybody can write.
-void refuse_own_guardian_of_first_process(const driver::DriverOptions& driver) {
-  if (::getpid() != 1 || (driver.emulated && !config::is_real_board(driver))) return;
+void refuse_own_guardian_of_first_process() {
+  if (::getpid() != 1) return;
   throw driver::Unavailable(
       "guardian: this program is process 1 of its namespace (a container's entry point): its end would end its own "
       "guardian too, and the board would hold its duties. Use the resident service of the computer: give the container "
@@ -189,7 +189,7 @@ std::unique_ptr<GuardianLease> ask_for_lease(const config::Settings& settings, b
                       options.socket));
     }
   }
-  refuse_own_guardian_of_first_process(driver);
+  refuse_own_guardian_of_first_process();
   return nullptr;
 }
 

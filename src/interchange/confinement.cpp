@@ -6,6 +6,7 @@
 #include <linux/capability.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -57,18 +58,59 @@ constexpr std::array forbidden_in_part{ABS_HIL_CALL(clone),
                                        ABS_HIL_CALL(prctl),
                                        ABS_HIL_CALL(fcntl),
                                        ABS_HIL_CALL(ioctl)};
-/// They fail as they do on a system without them. Honest libraries try them and go on. They could reach around the
-/// limits, outlive the process, or change files that cannot be written.
-constexpr std::array absent {
+/// What honest code needs. All other calls, also those that the kernel will get, fail as on a system without them:
+/// libraries try them and go on.
+constexpr std::array allowed {
 #if defined(__x86_64__)
-  ABS_HIL_CALL(chmod), ABS_HIL_CALL(chown), ABS_HIL_CALL(lchown),
+  ABS_HIL_CALL(access), ABS_HIL_CALL(alarm), ABS_HIL_CALL(arch_prctl), ABS_HIL_CALL(creat), ABS_HIL_CALL(dup2),
+      ABS_HIL_CALL(epoll_create), ABS_HIL_CALL(epoll_wait), ABS_HIL_CALL(eventfd), ABS_HIL_CALL(getdents),
+      ABS_HIL_CALL(getpgrp), ABS_HIL_CALL(getrlimit), ABS_HIL_CALL(link), ABS_HIL_CALL(lstat), ABS_HIL_CALL(mkdir),
+      ABS_HIL_CALL(open), ABS_HIL_CALL(pause), ABS_HIL_CALL(pipe), ABS_HIL_CALL(poll), ABS_HIL_CALL(readlink),
+      ABS_HIL_CALL(rename), ABS_HIL_CALL(rmdir), ABS_HIL_CALL(select), ABS_HIL_CALL(setrlimit), ABS_HIL_CALL(stat),
+      ABS_HIL_CALL(symlink), ABS_HIL_CALL(time), ABS_HIL_CALL(unlink),
 #endif
-      ABS_HIL_CALL(clone3), ABS_HIL_CALL(io_uring_setup), ABS_HIL_CALL(memfd_create), ABS_HIL_CALL(shmget),
-      ABS_HIL_CALL(msgget), ABS_HIL_CALL(semget), ABS_HIL_CALL(mq_open), ABS_HIL_CALL(bpf),
-      ABS_HIL_CALL(perf_event_open), ABS_HIL_CALL(pidfd_getfd), ABS_HIL_CALL(keyctl), ABS_HIL_CALL(add_key),
-      ABS_HIL_CALL(userfaultfd), ABS_HIL_CALL(fchmod), ABS_HIL_CALL(fchmodat), ABS_HIL_CALL(fchown),
-      ABS_HIL_CALL(fchownat), ABS_HIL_CALL(setxattr), ABS_HIL_CALL(lsetxattr), ABS_HIL_CALL(fsetxattr)
+      // Memory, threads, signals to itself.
+      ABS_HIL_CALL(brk), ABS_HIL_CALL(mmap), ABS_HIL_CALL(munmap), ABS_HIL_CALL(mremap), ABS_HIL_CALL(mprotect),
+      ABS_HIL_CALL(madvise), ABS_HIL_CALL(mincore), ABS_HIL_CALL(msync), ABS_HIL_CALL(mlock), ABS_HIL_CALL(munlock),
+      ABS_HIL_CALL(get_mempolicy), ABS_HIL_CALL(membarrier), ABS_HIL_CALL(clone), ABS_HIL_CALL(futex),
+      ABS_HIL_CALL(set_robust_list), ABS_HIL_CALL(get_robust_list), ABS_HIL_CALL(set_tid_address),
+      SystemCall{334, "rseq"}, ABS_HIL_CALL(exit), ABS_HIL_CALL(exit_group), ABS_HIL_CALL(wait4),
+      ABS_HIL_CALL(sched_yield), ABS_HIL_CALL(sched_getaffinity), ABS_HIL_CALL(sched_setaffinity),
+      ABS_HIL_CALL(sched_getparam), ABS_HIL_CALL(sched_getscheduler), ABS_HIL_CALL(sched_get_priority_max),
+      ABS_HIL_CALL(sched_get_priority_min), ABS_HIL_CALL(getcpu), ABS_HIL_CALL(rt_sigaction),
+      ABS_HIL_CALL(rt_sigprocmask), ABS_HIL_CALL(rt_sigreturn), ABS_HIL_CALL(rt_sigpending),
+      ABS_HIL_CALL(rt_sigsuspend), ABS_HIL_CALL(rt_sigtimedwait), ABS_HIL_CALL(sigaltstack),
+      ABS_HIL_CALL(restart_syscall), ABS_HIL_CALL(kill), ABS_HIL_CALL(tgkill), ABS_HIL_CALL(rt_sigqueueinfo),
+      ABS_HIL_CALL(rt_tgsigqueueinfo),
+      // Time.
+      ABS_HIL_CALL(clock_gettime), ABS_HIL_CALL(clock_getres), ABS_HIL_CALL(clock_nanosleep), ABS_HIL_CALL(nanosleep),
+      ABS_HIL_CALL(gettimeofday), ABS_HIL_CALL(times), ABS_HIL_CALL(getitimer), ABS_HIL_CALL(setitimer),
+      // Files. What may be written is Landlock's affair; `truncate` by path is older Landlocks' gap.
+      ABS_HIL_CALL(read), ABS_HIL_CALL(write), ABS_HIL_CALL(readv), ABS_HIL_CALL(writev), ABS_HIL_CALL(pread64),
+      ABS_HIL_CALL(pwrite64), ABS_HIL_CALL(preadv), ABS_HIL_CALL(pwritev), ABS_HIL_CALL(openat), ABS_HIL_CALL(close),
+      ABS_HIL_CALL(fstat), ABS_HIL_CALL(newfstatat), ABS_HIL_CALL(statx), ABS_HIL_CALL(statfs), ABS_HIL_CALL(fstatfs),
+      ABS_HIL_CALL(faccessat), SystemCall{439, "faccessat2"}, ABS_HIL_CALL(readlinkat), ABS_HIL_CALL(getdents64),
+      ABS_HIL_CALL(lseek), ABS_HIL_CALL(dup), ABS_HIL_CALL(dup3), ABS_HIL_CALL(fcntl), ABS_HIL_CALL(flock),
+      ABS_HIL_CALL(fsync), ABS_HIL_CALL(fdatasync), ABS_HIL_CALL(ftruncate), ABS_HIL_CALL(fallocate),
+      ABS_HIL_CALL(mkdirat), ABS_HIL_CALL(unlinkat), ABS_HIL_CALL(renameat), ABS_HIL_CALL(renameat2),
+      ABS_HIL_CALL(linkat), ABS_HIL_CALL(symlinkat), ABS_HIL_CALL(umask), ABS_HIL_CALL(getcwd), ABS_HIL_CALL(chdir),
+      ABS_HIL_CALL(fchdir), ABS_HIL_CALL(fadvise64), ABS_HIL_CALL(sendfile), ABS_HIL_CALL(copy_file_range),
+      SystemCall{436, "close_range"},
+      // Descriptors that it has.
+      ABS_HIL_CALL(pipe2), ABS_HIL_CALL(eventfd2), ABS_HIL_CALL(ppoll), ABS_HIL_CALL(pselect6),
+      ABS_HIL_CALL(epoll_create1), ABS_HIL_CALL(epoll_ctl), ABS_HIL_CALL(epoll_pwait), ABS_HIL_CALL(timerfd_create),
+      ABS_HIL_CALL(timerfd_settime), ABS_HIL_CALL(timerfd_gettime), ABS_HIL_CALL(socketpair), ABS_HIL_CALL(sendto),
+      ABS_HIL_CALL(recvfrom), ABS_HIL_CALL(sendmsg), ABS_HIL_CALL(recvmsg), ABS_HIL_CALL(shutdown),
+      ABS_HIL_CALL(getsockname), ABS_HIL_CALL(getpeername), ABS_HIL_CALL(getsockopt),
+      // Facts about itself and the computer.
+      ABS_HIL_CALL(getpid), ABS_HIL_CALL(getppid), ABS_HIL_CALL(gettid), ABS_HIL_CALL(getpgid), ABS_HIL_CALL(getsid),
+      ABS_HIL_CALL(getuid), ABS_HIL_CALL(geteuid), ABS_HIL_CALL(getgid), ABS_HIL_CALL(getegid), ABS_HIL_CALL(getgroups),
+      ABS_HIL_CALL(getresuid), ABS_HIL_CALL(getresgid), ABS_HIL_CALL(capget), ABS_HIL_CALL(uname),
+      ABS_HIL_CALL(sysinfo), ABS_HIL_CALL(getrusage), ABS_HIL_CALL(getpriority), ABS_HIL_CALL(prlimit64),
+      ABS_HIL_CALL(prctl), ABS_HIL_CALL(getrandom)
 };
+/// Of a descriptor that it has, ioctl tells these and sets nothing that outlives it.
+constexpr std::array<std::uint32_t, 6> allowed_of_ioctl{TCGETS, TIOCGWINSZ, FIONREAD, FIONBIO, FIOCLEX, FIONCLEX};
 
 #undef ABS_HIL_CALL
 
@@ -170,7 +212,6 @@ bool filter_calls() {
   Filter filter;
   filter.insist_on_architecture();
   for (const SystemCall& call : forbidden) filter.give_for(call.number, ends);
-  for (const SystemCall& call : absent) filter.give_for(call.number, fails_with(ENOSYS));
   filter.give_without(SYS_clone, 0, thread, ends);
   // Honest libraries ask whether there is a network (Python's), or local services for names of users (the C library's).
   filter.give_for(SYS_socket, fails_with(EACCES));
@@ -186,7 +227,10 @@ bool filter_calls() {
     filter.give_if(SYS_fcntl, 1, static_cast<std::uint32_t>(command), true, ends);
   }
   for (const std::uint32_t command : {set_owner, set_group}) filter.give_if(SYS_ioctl, 1, command, true, ends);
-  filter.give(SECCOMP_RET_ALLOW);
+  for (const std::uint32_t command : allowed_of_ioctl) filter.give_if(SYS_ioctl, 1, command, true, SECCOMP_RET_ALLOW);
+  filter.give_for(SYS_ioctl, fails_with(ENOTTY));
+  for (const SystemCall& call : allowed) filter.give_for(call.number, SECCOMP_RET_ALLOW);
+  filter.give(fails_with(ENOSYS));
   return filter.install();
 }
 
@@ -226,29 +270,29 @@ bool drop_capabilities() {
   return ::syscall(SYS_capset, &header, sets.data()) == 0;
 }
 
-/// Leaves files outside the folder for temporary files as they are. Without Landlock (before Linux 5.13, or switched
-/// off) this does nothing. The headers of older distributions lack it, so its numbers stand here.
-void keep_files() {
+/// Leaves files outside the folder for temporary files as they are. False without Landlock (before Linux 5.13, or
+/// switched off). The headers of older distributions lack it, so its numbers stand here.
+bool keep_files() {
   constexpr long create_ruleset = 444;
   constexpr long add_rule = 445;
   constexpr long restrict_self = 446;
   constexpr unsigned ask_version = 1;
   constexpr int below_path = 1;
   const long version = ::syscall(create_ruleset, nullptr, 0, ask_version);
-  if (version < 1) return;
+  if (version < 1) return false;
   // Writing, removing and making files; from version 2 on moving them, from 3 on truncating them.
   std::uint64_t handled = 0x1FF2;
   if (version >= 2) handled |= 1U << 13U;
   if (version >= 3) handled |= 1U << 14U;
   const int rules = static_cast<int>(::syscall(create_ruleset, &handled, sizeof handled, 0));
-  if (rules < 0) return;
+  if (rules < 0) return false;
   struct __attribute__((packed)) Below {
     std::uint64_t allowed;
     std::int32_t folder;
   };
   std::error_code error;
-  const auto allow = [&](const std::filesystem::path& path, std::uint64_t allowed) {
-    const Below below{.allowed = allowed, .folder = ::open(path.c_str(), O_PATH | O_CLOEXEC)};
+  const auto allow = [&](const std::filesystem::path& path, std::uint64_t rights) {
+    const Below below{.allowed = rights, .folder = ::open(path.c_str(), O_PATH | O_CLOEXEC)};
     if (below.folder < 0) return;
     static_cast<void>(::syscall(add_rule, rules, below_path, &below, 0));
     ::close(below.folder);
@@ -256,17 +300,22 @@ void keep_files() {
   allow(std::filesystem::temp_directory_path(error), handled);
   allow("/dev/null", 0x2);
   static_cast<void>(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0));
-  static_cast<void>(::syscall(restrict_self, rules, 0));
+  const bool kept = ::syscall(restrict_self, rules, 0) == 0;
   ::close(rules);
+  return kept;
 }
 
 }  // namespace
 
-std::string confine(int socket) {
+std::string confine(int socket, bool files_unprotected) {
   const auto failed = [](const char* what) { return std::string(what) + ": " + std::strerror(errno); };
   static_cast<void>(::syscall(SYS_close_range, socket + 1, ~0U, 0));
   if (!limit_resources()) return failed("setrlimit");
-  keep_files();
+  if (!keep_files() && !files_unprotected) {
+    return "it has no Landlock, so the code could change every file of this user; boot with lsm=landlock, or accept "
+           "the "
+           "risk with --set unsafe.foreign_files=true";
+  }
   if (!drop_capabilities()) return failed("capset");
   if (!catch_traps(socket) || !filter_calls()) return failed("seccomp");
   return {};

@@ -13,12 +13,13 @@ inline constexpr std::uint64_t host_descriptors_max = 128;                      
 inline constexpr std::uint64_t host_threads_max = 256;                            ///< counted by the run
 
 /// From now on this process may use no more than the limits above; it may start no process, touch no other process,
-/// take no priority, open no socket and write no file outside the folder for temporary files (the last where the kernel
-/// has Landlock). What asks for a socket or a file gets an error, as honest code expects it. The other forbidden system
-/// calls end the process: it sends `HostRefusal` on `socket`. Descriptors above `socket` are
-/// closed, capabilities dropped. Holds for its threads to come. Works for root and without.
+/// take no priority, open no socket and write no file outside the folder for temporary files. It may make the system
+/// calls of a list; others fail with ENOSYS, but for those that only an attack makes: they end the process, which sends
+/// `HostRefusal` on `socket`. What asks for a socket or a file gets an error, as honest code expects it. Descriptors
+/// above `socket` are closed, capabilities dropped. Holds for its threads to come. Works for root and without.
+/// @param files_unprotected  go on where the kernel has no Landlock, which keeps the files
 /// Returns why the kernel cannot do that; empty if it can.
-[[nodiscard]] std::string confine(int socket);
+[[nodiscard]] std::string confine(int socket, bool files_unprotected = false);
 
 /// Name of a system call that ends confined code; "another one" for those that do not.
 [[nodiscard]] const char* name_of_forbidden(std::int32_t number) noexcept;

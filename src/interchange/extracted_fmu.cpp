@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -18,8 +17,10 @@
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/driver/io_result.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::interchange {
 
@@ -111,8 +112,15 @@ std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
                                  fs::path(platform_folders[0]).parent_path().filename().string()));
 }
 
+[[noreturn]] void refuse_temporary(const fs::path& place, int error) {
+  throw driver::Unavailable(fmt::format("an FMU is unpacked into the folder for temporary files, {}: {}; or set TMPDIR",
+                                        place.string(), rig::refusal(error, place, rig::writing)));
+}
+
 void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs::path& to) {
-  fs::create_directories(to.parent_path());
+  std::error_code error;
+  fs::create_directories(to.parent_path(), error);
+  if (error) refuse_temporary(to, error.value());
   const std::unique_ptr<zip_file_t, Closer> in(zip_fopen_index(archive, entry.index, 0));
   if (!in) refuse(file, fmt::format("damaged: \"{}\": {}", entry.name, zip_strerror(archive)));
   std::ofstream out(to, std::ios::binary);
@@ -126,7 +134,7 @@ void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs:
   }
   if (more < 0 || got != entry.size) refuse(file, fmt::format("damaged: \"{}\" cannot be unpacked", entry.name));
   out.close();
-  if (!out) throw std::runtime_error(fmt::format("{}: {}", to.string(), std::strerror(errno)));
+  if (!out) refuse_temporary(to, errno);
 }
 
 /// Where the tag ends that begins `text`: a '>' in quotes does not end it.
@@ -192,8 +200,12 @@ void check_count(const fs::path& file) {
 }  // namespace
 
 ExtractedFmu::ExtractedFmu() {
-  std::string name = (fs::temp_directory_path() / "abs_hil_fmu.XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(fmt::format("{}: {}", name, std::strerror(errno)));
+  std::error_code error;
+  const fs::path parent = fs::temp_directory_path(error);
+  const char* given = std::getenv("TMPDIR");
+  if (error) refuse_temporary(given != nullptr ? given : "/tmp", error.value());
+  std::string name = (parent / "abs_hil_fmu.XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) refuse_temporary(parent, errno);
   folder_ = name;
 }
 
@@ -209,7 +221,8 @@ ExtractedFmu::ExtractedFmu(const fs::path& file) : ExtractedFmu() {
     zip_error_init_with_code(&reason, code);
     const std::string text = zip_error_strerror(&reason);
     zip_error_fini(&reason);
-    refuse(file, "not an FMU: it cannot be read as a zip archive: " + text);
+    refuse(file,
+           "not an FMU: it cannot be read as a zip archive: " + rig::refusal(text, file, "give the file of an FMU"));
   }
   const std::vector<Entry> entries = entries_of(file, archive.get());
   // The description first: what it shows to be hostile is refused before the rest is unpacked.

@@ -4,15 +4,19 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <cstdarg>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <type_traits>
+#include <vector>
 
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
 #include "interchange/loaded_library.hpp"
+#include "rig/file_uri.hpp"
 
 namespace abs_hil::interchange {
 
@@ -75,23 +79,25 @@ class Function {
   Type* function_;
 };
 
-/// The functions of one version that a controller needs.
+/// A variable with the function that sets or gets it.
+struct Port : FmuLink {
+  std::string name;
+  void* function;
+};
+
+/// The functions of one version that a controller needs, beside those that set and get values.
 class Instance2 {
  public:
   Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
-    const std::string uri = "file://" + resources;
-    instance_.reset(instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), uri.c_str(), &callbacks_,
-                                 fmi2False, fmi2False));
+    instance_.reset(instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), rig::file_uri(resources).c_str(),
+                                 &callbacks_, fmi2False, fmi2False));
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_.get(), &r, 1, &value); }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_.get(), &r, 1, &value); }
-  [[nodiscard]] Called set_flag(std::uint32_t r, bool flag) const {
-    const fmi2Boolean value = flag ? fmi2True : fmi2False;
-    return set_flag_(instance_.get(), &r, 1, &value);
-  }
-  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
-    return set_integer_(instance_.get(), &r, 1, &value);
+  /// @param value  of the variable's type: all these functions differ in that alone
+  [[nodiscard]] Called pass(const Port& port, void* value) const {
+    using Function2 = fmi2Status(void*, const std::uint32_t*, std::size_t, void*);
+    return {port.name.c_str(), static_cast<unsigned>(reinterpret_cast<Function2*>(port.function)(
+                                   instance_.get(), &port.reference, 1, value))};
   }
   [[nodiscard]] Called enter() const {
     const Called called = set_up_(instance_.get(), fmi2False, 0.0, 0.0, fmi2False, 0.0);
@@ -111,10 +117,6 @@ class Instance2 {
   Function<fmi2EnterInitializationModeTYPE> enter_{library_, "fmi2EnterInitializationMode"};
   Function<fmi2ExitInitializationModeTYPE> exit_{library_, "fmi2ExitInitializationMode"};
   Function<fmi2ResetTYPE> reset_{library_, "fmi2Reset"};
-  Function<fmi2SetRealTYPE> set_{library_, "fmi2SetReal"};
-  Function<fmi2GetRealTYPE> get_{library_, "fmi2GetReal"};
-  Function<fmi2SetBooleanTYPE> set_flag_{library_, "fmi2SetBoolean"};
-  Function<fmi2SetIntegerTYPE> set_integer_{library_, "fmi2SetInteger"};
   Function<fmi2DoStepTYPE> step_{library_, "fmi2DoStep"};
   std::unique_ptr<void, fmi2FreeInstanceTYPE*> instance_{nullptr,
                                                          library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")};
@@ -128,13 +130,10 @@ class Instance3 {
                                  fmi3False, nullptr, 0, nullptr, log3, nullptr));
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called set(std::uint32_t r, double value) const { return set_(instance_.get(), &r, 1, &value, 1); }
-  [[nodiscard]] Called get(std::uint32_t r, double& value) const { return get_(instance_.get(), &r, 1, &value, 1); }
-  [[nodiscard]] Called set_flag(std::uint32_t r, bool value) const {
-    return set_flag_(instance_.get(), &r, 1, &value, 1);
-  }
-  [[nodiscard]] Called set_integer(std::uint32_t r, int value) const {
-    return set_integer_(instance_.get(), &r, 1, &value, 1);
+  [[nodiscard]] Called pass(const Port& port, void* value) const {
+    using Function3 = fmi3Status(void*, const std::uint32_t*, std::size_t, void*, std::size_t);
+    return {port.name.c_str(), static_cast<unsigned>(reinterpret_cast<Function3*>(port.function)(
+                                   instance_.get(), &port.reference, 1, value, 1))};
   }
   [[nodiscard]] Called enter() const { return enter_(instance_.get(), fmi3False, 0.0, 0.0, fmi3False, 0.0); }
   [[nodiscard]] Called exit() const { return exit_(instance_.get()); }
@@ -155,24 +154,37 @@ class Instance3 {
   Function<fmi3EnterInitializationModeTYPE> enter_{library_, "fmi3EnterInitializationMode"};
   Function<fmi3ExitInitializationModeTYPE> exit_{library_, "fmi3ExitInitializationMode"};
   Function<fmi3ResetTYPE> reset_{library_, "fmi3Reset"};
-  Function<fmi3SetFloat64TYPE> set_{library_, "fmi3SetFloat64"};
-  Function<fmi3GetFloat64TYPE> get_{library_, "fmi3GetFloat64"};
-  Function<fmi3SetBooleanTYPE> set_flag_{library_, "fmi3SetBoolean"};
-  Function<fmi3SetInt32TYPE> set_integer_{library_, "fmi3SetInt32"};
   Function<fmi3DoStepTYPE> step_{library_, "fmi3DoStep"};
   std::unique_ptr<void, fmi3FreeInstanceTYPE*> instance_{nullptr,
                                                          library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")};
 };
+
+/// The value as a type of FMI has it: a flag is true but for 0, a whole number the nearest of its range, 0 for NaN.
+template <class Value>
+Value value_as(double value) noexcept {
+  if constexpr (std::is_floating_point_v<Value>) {
+    return static_cast<Value>(value);
+  } else if constexpr (std::is_enum_v<Value> || std::is_same_v<Value, bool>) {
+    return static_cast<Value>(value != 0.0);
+  } else {
+    using Range = std::numeric_limits<Value>;
+    const double whole = std::isnan(value) ? 0.0 : std::round(value);
+    if (whole >= static_cast<double>(Range::max())) return Range::max();
+    return whole <= static_cast<double>(Range::min()) ? Range::min() : static_cast<Value>(whole);
+  }
+}
 
 /// The controller in an FMU. A step sets the inputs of this cycle, lets the FMU compute one period, and takes its
 /// outputs.
 template <class Instance>
 class FmuCode final : public ForeignCode {
  public:
-  FmuCode(const ForeignSetup& setup, FmuFacts facts)
-      : facts_(std::move(facts)),
-        library_(facts_.library, setup.file),
-        instance_(library_, facts_, (setup.folder / "resources").string()),
+  FmuCode(const ForeignSetup& setup, const FmuFacts& facts)
+      : library_(facts.library, setup.file),
+        instance_(library_, facts, (setup.folder / "resources").string()),
+        inputs_(ports(facts.inputs, facts.fmi, "Set")),
+        outputs_(ports(facts.outputs, facts.fmi, "Get")),
+        parameters_(ports(facts.parameters, facts.fmi, "Set")),
         period_s_(setup.period_s) {
     if (!instance_.made()) refuse(setup.file, "it cannot be instantiated; the line above says why, if the FMU did");
     begin();
@@ -185,12 +197,11 @@ class FmuCode final : public ForeignCode {
   void step(const abs_hil_input& input, abs_hil_output& output) noexcept override {
     fresh_ = false;
     if (failed_.worked()) ++steps_;
-    for (const FmuLink& in : facts_.inputs)
-      call([&] { return instance_.set(in.reference, field_of(&input, in.offset)); });
+    for (const Port& in : inputs_) call([&] { return set(in, field_of(&input, in.offset)); });
     call([&] { return instance_.step(static_cast<double>(steps_ - 1) * period_s_, period_s_); });
-    for (const FmuLink& out : facts_.outputs) {
+    for (const Port& out : outputs_) {
       double value = std::numeric_limits<double>::quiet_NaN();
-      call([&] { return instance_.get(out.reference, value); });
+      call([&] { return get(out, value); });
       put_field(&output, out.offset, value);
     }
     if (!failed_.worked()) output.brake_torque_Nm = std::numeric_limits<double>::quiet_NaN();
@@ -203,16 +214,39 @@ class FmuCode final : public ForeignCode {
   }
 
  private:
+  std::vector<Port> ports(const std::vector<FmuLink>& links, int fmi, const char* deed) const {
+    std::vector<Port> ports;
+    for (const FmuLink& link : links) {
+      std::string name = fmt::format("fmi{}{}{}", fmi, deed, link.type.functions);
+      void* const function = library_.find<void>(name.c_str());
+      ports.push_back({link, std::move(name), function});
+    }
+    return ports;
+  }
+  [[nodiscard]] Called set(const Port& port, double value) const {
+    return std::visit(
+        [&]<class Value>(Value) {
+          Value its = value_as<Value>(value);
+          return instance_.pass(port, &its);
+        },
+        port.type.zero);
+  }
+  [[nodiscard]] Called get(const Port& port, double& value) const {
+    return std::visit(
+        [&](auto its) {
+          const Called called = instance_.pass(port, &its);
+          if (called.worked()) value = static_cast<double>(its);
+          return called;
+        },
+        port.type.zero);
+  }
   /// Nothing more is called after a failure.
   template <class Call>
   void call(const Call& function) {
     if (failed_.worked()) failed_ = function();
   }
   void begin() {
-    for (const FmuLink& p : facts_.parameters) call([&] { return instance_.set(p.reference, p.value); });
-    for (const FmuLink& p : facts_.flags) call([&] { return instance_.set_flag(p.reference, p.value != 0.0); });
-    for (const FmuLink& p : facts_.integers)
-      call([&] { return instance_.set_integer(p.reference, static_cast<int>(p.value)); });
+    for (const Port& p : parameters_) call([&] { return set(p, p.wanted); });
     call([&] { return instance_.enter(); });
     call([&] { return instance_.exit(); });
     fresh_ = failed_.worked();
@@ -224,9 +258,11 @@ class FmuCode final : public ForeignCode {
     begin();
   }
 
-  FmuFacts facts_;
   LoadedLibrary library_;
   Instance instance_;
+  std::vector<Port> inputs_;
+  std::vector<Port> outputs_;
+  std::vector<Port> parameters_;
   double period_s_;
   std::int64_t steps_{0};  ///< since the last reset
   bool fresh_{false};
@@ -236,9 +272,9 @@ class FmuCode final : public ForeignCode {
 }  // namespace
 
 std::unique_ptr<ForeignCode> load_fmu(const ForeignSetup& setup) {
-  FmuFacts facts = facts_of(setup.file, setup.folder, setup.mapping);
-  if (facts.fmi == 3) return std::make_unique<FmuCode<Instance3>>(setup, std::move(facts));
-  return std::make_unique<FmuCode<Instance2>>(setup, std::move(facts));
+  const FmuFacts facts = facts_of(setup.file, setup.folder, setup.mapping);
+  if (facts.fmi == 3) return std::make_unique<FmuCode<Instance3>>(setup, facts);
+  return std::make_unique<FmuCode<Instance2>>(setup, facts);
 }
 
 }  // namespace abs_hil::interchange

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 namespace abs_hil::interchange {
@@ -27,11 +29,23 @@ class ExtractedFmu {
   std::filesystem::path folder_{};
 };
 
+enum class IntFlag : int {};  ///< a Boolean of FMI 2
+
+/// A numeric type of FMI.
+struct FmuType {
+  std::string_view name;       ///< as the description has it
+  std::string_view functions;  ///< that set and get it: fmi3SetInt64 for an Enumeration of FMI 3
+  std::variant<double, float, std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t, std::uint32_t,
+               std::int64_t, std::uint64_t, bool, IntFlag>
+      zero;
+};
+
 /// A variable of an FMU that carries one of our quantities, or a parameter with its value.
 struct FmuLink {
   std::uint32_t reference{0};
-  std::size_t offset{0};
-  double value{0.0};  ///< of a parameter
+  std::size_t offset{0};  ///< of the quantity in abs_hil_input or abs_hil_output
+  double wanted{0.0};     ///< of a parameter
+  FmuType type{};
 };
 
 /// What a controller's FMU is, and how its variables belong to ours.
@@ -41,9 +55,7 @@ struct FmuFacts {
   std::filesystem::path library{};
   std::vector<FmuLink> inputs{};
   std::vector<FmuLink> outputs{};
-  std::vector<FmuLink> parameters{};  ///< real ones
-  std::vector<FmuLink> flags{};       ///< Boolean ones
-  std::vector<FmuLink> integers{};
+  std::vector<FmuLink> parameters{};
 };
 
 /// Reads the description in an extracted FMU, and the mapping if there is one.

@@ -96,5 +96,7 @@ void for_each_output(Foreign& foreign, Own& own, const Take& take) {
 /// Lets the registry make them.
 void register_foreign_controllers();
 void set_home(Home home) noexcept;
+/// Whether a person accepts foreign code that could change files, where the kernel has no Landlock; at first: no.
+void accept_unprotected_files(bool accepted) noexcept;
 
 }  // namespace abs_hil::interchange

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -18,14 +17,15 @@
 #include <string_view>
 #include <utility>
 
+#include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/option.hpp"
 #include "driver/file_descriptor.hpp"
+#include "driver/spawn.hpp"
 #include "interchange/confinement.hpp"
+#include "rig/clean_text.hpp"
+#include "rig/error_words.hpp"
 #include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
-
-// NOLINTNEXTLINE(readability-redundant-declaration): POSIX wants it declared
-extern char** environ;
 
 namespace abs_hil::interchange {
 
@@ -41,38 +41,6 @@ constexpr const char* not_allowed =
     "a controller from a file may start no process, touch no other process and take no priority";
 /// What foreign code prints is passed on up to this many bytes.
 constexpr std::size_t printed_max = 65'536;
-
-pid_t spawn(const std::string& program, int socket, int prints) {
-  posix_spawn_file_actions_t actions{};
-  posix_spawnattr_t attributes{};
-  posix_spawn_file_actions_init(&actions);
-  posix_spawnattr_init(&attributes);
-  sigset_t none{};
-  sigset_t all{};
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  // A session of its own: Ctrl-C ends the run in order and must not kill its controller.
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  // Not the run's own stderr: nothing of the code's may hold that.
-  posix_spawn_file_actions_adddup2(&actions, prints, STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, prints, STDERR_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, socket, host_socket);
-  std::string name = std::filesystem::path(program).filename().string();
-  std::array<char*, 2> arguments{name.data(), nullptr};
-  pid_t pid = 0;
-  const int error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error != 0) {
-    throw std::runtime_error(
-        fmt::format("{}: {}: controllers from files run in it; install it in the folder of abs_hil{}", program,
-                    std::strerror(error), name == python_host ? ", with the Python package" : ""));
-  }
-  return pid;
-}
 
 /// Empty: the running program.
 std::filesystem::path& program_of_the_host() {
@@ -104,15 +72,23 @@ void HostedCode::start(const std::string& program) {
   std::array<int, 2> ends{-1, -1};
   std::array<int, 2> pipe{-1, -1};
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-    throw std::runtime_error(std::string("socketpair: ") + std::strerror(errno));
+    throw driver::Unavailable("socketpair: " + rig::refusal(errno, "", rig::starting));
   }
   socket_ = ends[0];
   const driver::FileDescriptor their_socket(ends[1]);
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
+    throw driver::Unavailable("pipe: " + rig::refusal(errno, "", rig::starting));
   prints_ = pipe[0];
   const driver::FileDescriptor their_prints(pipe[1]);
   ::fcntl(prints_, F_SETFL, O_NONBLOCK);
-  pid_ = spawn(program, their_socket.get(), their_prints.get());
+  // Not the run's own stderr: nothing of the code's may hold that.
+  const int error = driver::spawn(
+      pid_, program,
+      {{their_prints.get(), STDOUT_FILENO}, {their_prints.get(), STDERR_FILENO}, {their_socket.get(), host_socket}});
+  if (error == 0) return;
+  pid_ = 0;
+  throw driver::Unavailable(
+      fmt::format("{}, in which controllers from files run: {}", program, rig::refusal(error, program, rig::starting)));
 }
 
 // A constructor that ends by an exception after the other one has returned calls the destructor.
@@ -131,7 +107,8 @@ HostedCode::HostedCode(const ForeignSetup& setup) : HostedCode(setup.period_s) {
   }
   try {
     const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
-    if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
+    if (json.contains("error"))
+      throw std::invalid_argument(rig::clean_text(json.at("error").get<std::string>(), 2000, "\n"));
     json.at("signals").get_to(signals_);
     json.at("source").get_to(source_);
   } catch (const nlohmann::json::exception&) {
@@ -165,7 +142,8 @@ void HostedCode::pass_on_prints() noexcept {
     // A full pipe behind stderr must not stop the run.
     pollfd room{STDERR_FILENO, POLLOUT, 0};
     if (::poll(&room, 1, 0) != 1) continue;
-    static_cast<void>(!::write(STDERR_FILENO, text.data(), static_cast<std::size_t>(got)));
+    const std::string shown = rig::clean_text({text.data(), static_cast<std::size_t>(got)}, text.size(), "\n\t");
+    static_cast<void>(!::write(STDERR_FILENO, shown.data(), shown.size()));
     constexpr std::string_view enough = "\nabs_hil: the controller prints too much; the rest is left out\n";
     if (printed_ >= printed_max) static_cast<void>(!::write(STDERR_FILENO, enough.data(), enough.size()));
   }
@@ -229,7 +207,10 @@ std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
     return fmt::format("was ended: it asked for a system call that is not allowed, probably to start a process; {}",
                        not_allowed);
   }
-  if (WIFSIGNALED(status)) return fmt::format("crashed: {}", ::strsignal(WTERMSIG(status)));
+  if (WIFSIGNALED(status)) {
+    return fmt::format("crashed: {}{}", ::strsignal(WTERMSIG(status)),
+                       WTERMSIG(status) == SIGBUS ? " (as of a file that was cut off: copy or build it again)" : "");
+  }
   return fmt::format("ended its process with status {}", WEXITSTATUS(status));
 }
 

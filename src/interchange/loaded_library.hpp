@@ -7,6 +7,7 @@
 #include <string>
 
 #include "interchange/foreign_code.hpp"
+#include "rig/error_words.hpp"
 
 namespace abs_hil::interchange {
 
@@ -20,8 +21,8 @@ class LoadedLibrary {
       // elsewhere.
       : file_(std::move(file)), handle_(::dlopen(std::filesystem::absolute(library).c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (handle_) return;
-    refuse(file_, std::string("not a shared library that this computer can load (") + ::dlerror() +
-                      "); build it here, with cc -shared -fPIC");
+    refuse(file_, "not a shared library that this computer can load: " +
+                      rig::refusal(std::string(::dlerror()), std::filesystem::absolute(library)));
   }
   /// The function or object of that name. Throws std::invalid_argument if there is none.
   template <class Symbol>

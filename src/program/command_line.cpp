@@ -30,9 +30,9 @@ void check_start(const RunRequest& request) {
 }
 
 void add_output_options(cli::Parser& parser, OutputOptions& o) {
-  parser.add("--csv", &o.csv_file, "write every cycle to a CSV file", {.type = "FILE"});
-  parser.add("--log", &o.log_file, "write an LCM event log (.lcmlog)", {.type = "FILE"});
-  parser.add("--summary", &o.summary_file, "write the summary as JSON", {.type = "FILE"});
+  parser.add("--csv", &o.csv_file, "write every cycle to a CSV file", {.type = "FILE.csv"});
+  parser.add("--log", &o.log_file, "write an LCM event log (.lcmlog)", {.type = "FILE.lcmlog"});
+  parser.add("--summary", &o.summary_file, "write the summary as JSON", {.type = "FILE.json"});
   parser.add("--prior", &o.prior_file,
              "what the controller learns for the next braking on this rig: read if the file is there, renewed "
              "after each braking that stops",

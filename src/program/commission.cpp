@@ -22,6 +22,7 @@
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil::program {
 
@@ -140,7 +141,7 @@ void keep_record(const config::Settings& settings, const driver::BoardIdentity& 
   record.outputs = measured.output_times();
   record.one_turn = measured.one_turn();
   record.date = fmt::format("{:%Y-%m-%d %H:%M:%S %z}", fmt::localtime(std::time(nullptr)));
-  record.version = ABS_HIL_VERSION;
+  record.version = version::build_facts().version;
   const auto file = experiment::write_record(record, experiment::record_folders(options.records));
   terminal.tell("commissioning record: " + file.string());
 }
@@ -198,6 +199,10 @@ std::string make_safe(const config::Settings& settings) try {
 int commission(const config::Configuration& configuration, const experiment::CommissioningOptions& options) {
   Terminal terminal;
   note_signals();
+  {  // Nobody is asked about a board that is not there. This reads only.
+    const auto lease = guardian::ask_for_lease(configuration.settings, false);
+    driver::make_rig_driver(configuration.settings.driver)->configure();
+  }
   const experiment::CommissioningResult result = go_through(configuration, options, terminal);
   if (result == experiment::CommissioningResult::passed) {
     terminal.tell(configuration.settings.driver.emulated

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "config/config_error.hpp"
+#include "interchange/foreign_controller.hpp"
 #include "program/command_line.hpp"
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
@@ -27,13 +28,10 @@ struct CompareOptions {
   std::size_t repeat{100};
   std::uint64_t seed{1};
   std::optional<std::string> vary{};
-  std::size_t threads{0};  ///< 0: one for each processor
-  std::optional<std::string> json_file{};
-  std::optional<std::string> csv_file{};
-  std::optional<std::string> markdown_file{};
+  std::size_t threads{0};          ///< 0: one for each processor
+  std::vector<std::string> out{};  ///< files of the table; with --run its folder
   std::optional<std::string> runs_file{};
-  std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
-  std::optional<std::string> run_folder{};  ///< --out: its folder
+  std::optional<int> recorded_run{};  ///< --run: repeat this run of each controller in place of the comparison
 };
 
 /// Refuses a file name that is a number: --repeat was meant.
@@ -54,10 +52,12 @@ int record(const CompareOptions& options, const study::Study& study, const std::
         fmt::format("--run {}: each controller has {} runs; give a number in [0, {}], or a larger --repeat", repetition,
                     options.repeat, options.repeat - 1));
   }
+  if (options.out.size() > 1) throw config::ConfigError("--out: with --run give one, a folder: nothing is compared");
   int status = exit_completed;
   std::set<std::string> names;
   for (std::size_t c = 0; c < contenders.size(); ++c) {
-    std::optional<std::string> folder = options.run_folder;
+    std::optional<std::string> folder;
+    if (!options.out.empty()) folder = options.out.front();
     if (folder && contenders.size() > 1) {
       constexpr std::size_t number_bytes = 12;
       std::string name = run_folder::folder_name(contenders[c].name, *folder, number_bytes);
@@ -76,6 +76,7 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
   keep_inputs(sources);
   const config::Configuration merged = config::merge(sources);
   const config::Settings& s = merged.settings;
+  interchange::accept_unprotected_files(s.unsafe.foreign_files);
   const study::Study study(
       {.controllers = study::split_contenders(options.controllers),
        .repeat = {.runs = options.repeat,
@@ -84,16 +85,15 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
        .path = "compare"},
       {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
   if (options.recorded_run) return record(options, study, command_line);
-  const auto json = open_result(options.json_file, "comparison");
-  const auto csv = open_result(options.csv_file, "comparison");
-  const auto markdown = open_result(options.markdown_file, "comparison");
+  std::vector<std::unique_ptr<files::ResultFile>> tables;
+  for (const std::string& file : options.out) tables.push_back(open_result(file, "comparison"));
   const auto runs_file = open_result(options.runs_file, "comparison");
 
   study::RunsByController runs;
   try {
-    RunProgress progress(study.runs());
+    RunProgress progress;
     const std::size_t threads = options.threads > 0 ? options.threads : study::machine_threads();
-    runs = study::run_by_controller(study, threads, [&progress](std::size_t done) { progress.show(done); });
+    runs = study::run_by_controller(study, threads, [&](std::size_t done) { progress.show(done, study.runs()); });
   } catch (const Interrupted& interrupted) {
     spdlog::warn(
         "interrupted after {} of {} runs. A comparison keeps nothing: repeat it, with fewer --repeat if it takes too "
@@ -102,9 +102,12 @@ int compare_controllers(const CompareOptions& options, const std::vector<std::st
     return status_of(signalled());
   }
   const study::ComparisonTable table = study::tabulate(study, runs);
-  if (json) json->write(study::to_json(table, merged.json));
-  if (csv) csv->write(study::to_csv(table));
-  if (markdown) markdown->write(study::to_markdown(table));
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    const std::string& file = options.out[i];
+    tables[i]->write(file.ends_with(".json")  ? study::to_json(table, merged.json)
+                     : file.ends_with(".csv") ? study::to_csv(table)
+                                              : study::to_markdown(table));
+  }
   if (runs_file) runs_file->write(study::runs_csv(study, runs));
   cli::print("{}", study::to_text(table));
   return exit_completed;
@@ -130,15 +133,14 @@ Action add_compare(cli::Parser& compare, const Words& words) {
   add_config_file(compare, o.sources);
   add_assignments(compare, o.sources);
   add_threads(compare, o.threads);
-  compare.add("--json", &o.json_file, "write the table as JSON", {.type = "FILE"});
-  compare.add("--csv", &o.csv_file, "write the table as CSV", {.type = "FILE"});
-  compare.add("--markdown", &o.markdown_file, "write the table as Markdown", {.type = "FILE"});
-  compare.add("--runs", &o.runs_file, "write each run's results as CSV", {.type = "FILE"});
+  compare.add("--out,--json,--csv,--markdown", &o.out,
+              "the table as FILE.csv, FILE.json or FILE.md, or several; with --run its run folder, or one below it for "
+              "each controller",
+              {.type = "FILE.csv|FILE.json|FILE.md|DIR", .repeated = true});
+  compare.add("--runs", &o.runs_file, "write each run's results as CSV", {.type = "FILE.csv"});
   compare.add("--run", &o.recorded_run,
               "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
-              {.type = "K", .range = {0, 999'999}, .excludes = {"--json", "--csv", "--markdown", "--runs"}});
-  compare.add("--out", &o.run_folder, "run folder of --run; with several controllers one below it for each",
-              {.type = "DIR", .needs = {"--run"}});
+              {.type = "K", .range = {0, 999'999}, .excludes = {"--runs"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
   return [options, words] { return compare_controllers(*options, words); };
 }

@@ -7,6 +7,7 @@
 #include "abs_hil/program/program.hpp"
 #include "cli/command_line.hpp"
 #include "guardian/guardian_program.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil {
 
@@ -19,14 +20,17 @@ int program::run_guardian(int argc, char** argv, std::span<const driver::Backend
   }
   const std::string_view first = argc > 1 ? argv[1] : "";
   if (first == "serve") return cli::with_stdout("abs_guardian", guardian::serve(argc, argv));
-  if (first == "--help" && argc == 2) {
-    std::puts(
-        "Usage: abs_guardian serve [--socket PATH] [--config FILE] [--set key=value]...\n\n"
-        "The guardian of the rig's outputs. When a controller dies, stops or hangs, it brings the outputs into the "
-        "safe state.\n`serve` is the resident service: it keeps the outputs at zero and grants them to one run at a "
-        "time. "
-        "`abs_guardian serve --help` names its options.\nWithout the service abs_hil starts a guardian for each run on "
-        "a board; do not start that one by hand (docs/dead-man.md).");
+  if (argc == 2 && (first == "--help" || first == "-h" || first == "--version")) {
+    std::puts(first == "--version" ? version::version_line("abs_guardian").c_str()
+                                   : "Usage: abs_guardian serve [--socket PATH] [--config FILE]\n"
+                                     "                          [--set key=value]...\n\n"
+                                     "The guardian of the rig's outputs. When a controller dies,\n"
+                                     "stops or hangs, it brings the outputs into the safe state.\n"
+                                     "`serve` is the resident service: it keeps the outputs at\n"
+                                     "zero and grants them to one run at a time. Its options:\n"
+                                     "abs_guardian serve --help. Without the service abs_hil\n"
+                                     "starts a guardian for each run on a board; do not start\n"
+                                     "that one by hand (docs/dead-man.md).");
     return cli::with_stdout("abs_guardian", 0);
   }
   if (argc != 1 || !guardian::started_by_a_run()) {

@@ -24,6 +24,7 @@
 #include "runtime/early_end.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil {
 
@@ -45,7 +46,13 @@ int dispatch(int argc, char** argv) {
   if (argc < 2) return say_what_to_type();
   const program::Words words(argv, argv + argc);
   cli::Parser parser("abs_hil", "Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig");
-  parser.set_version(ABS_HIL_VERSION);
+  parser.set_version(version::version_line("abs_hil"));
+  for (const char* word : {"run", "simulate", "sim"}) {
+    parser.explain(word, fmt::format("{} is no subcommand: `abs_hil` alone is a run. `abs_hil --fast` simulates one at "
+                                     "once, `abs_hil --backend sim` in real time; `--backend rig` drives a board",
+                                     word));
+  }
+  parser.explain("version", "version is no subcommand: abs_hil --version");
   program::RunOptions options;
   program::add_run_options(parser, options);
   struct Command {
@@ -61,6 +68,7 @@ int dispatch(int argc, char** argv) {
     const bool named = std::ranges::find(words, row.name) != words.end();
     if (row.add != nullptr && named) command.act = row.add(command.parser, words);
   }
+  parser.set_footer("`abs_hil help SUBCOMMAND` shows a subcommand's options.");
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
   for (const Command& command : commands) {
     if (!command.parser.parsed()) continue;
@@ -117,6 +125,13 @@ int checked(int argc, char** argv, std::span<const control::ControllerEntry> own
 int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own,
                          std::span<const driver::Backend> boards) {
   program::survive_closed_terminals();
+  std::string help = "--help";
+  std::vector<char*> asked(argv, argv + argc);
+  if (argc > 1 && asked[1] == std::string_view("help")) {  // `abs_hil help X` is `abs_hil X --help`
+    asked.erase(asked.begin() + 1);
+    asked.insert(asked.end(), {help.data(), nullptr});
+    argv = asked.data();
+  }
   try {
     for (const driver::Backend& board : boards) driver::register_backend(board);
     if (const std::optional<int> status = program::safe_at_once(argc, argv))

@@ -109,8 +109,8 @@ Action add_replay(cli::Parser& parser, const Words&) {
              {.type = "NAME", .excludes = {"--check"}});
   parser.add("--set", &o->assignments, "change a recorded configuration value",
              {.type = "key=value", .repeated = true, .excludes = {"--check"}});
-  parser.add("--csv", &o->csv_file, "write the replayed commands, with the columns of a run's CSV",
-             {.type = "FILE", .excludes = {"--check"}});
+  parser.add("--out,--csv", &o->csv_file, "write the replayed commands, with the columns of a run's CSV",
+             {.type = "FILE.csv", .excludes = {"--check"}});
   return [o] { return replay_run(*o); };
 }
 

@@ -13,6 +13,7 @@
 #include "experiment/board_record.hpp"
 #include "rig/error_words.hpp"
 #include "telemetry/flight_record.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil::program {
 
@@ -38,7 +39,7 @@ telemetry::ExperimentInfo experiment_info(const config::Configuration& configura
   info.plant = s.plant_name;
   info.backend = s.backend;
   info.config_json = configuration.json;
-  info.version = ABS_HIL_VERSION;
+  info.version = version::build_facts().version;
   info.names = std::move(names);
   return info;
 }

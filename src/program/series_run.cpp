@@ -318,7 +318,11 @@ class SeriesRun {
 
 }  // namespace
 
-int run_series(const RunOptions& common, const RunRequest& base) {
+int run_series(const RunOptions& options, const RunRequest& base) {
+  // The board has been asked once. A question between two runs would disturb the driver, which holds it.
+  RunOptions common = options;
+  common.asks_board = false;
+  if (base.settings.driver.emulated) common.assignments.emplace_back("driver.emulated=true");
   if (base.outputs.names_files()) {
     throw config::ConfigError(fmt::format(
         "{}: a series of runs does not fit in one file; give --out DIR in place of --csv, --log, --summary and "

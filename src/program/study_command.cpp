@@ -80,20 +80,17 @@ int run_study(const StudyCommand& command) {
   const auto start = std::chrono::steady_clock::now();
   const std::string path = folder.path().string();
   study::Tally tally;
-  std::uint64_t to_compute = 0;
+  std::uint64_t of_all = 0;
   try {
-    std::optional<RunProgress> progress;
-    tally = study::compute(study, folder, shard, command.threads, [&](std::uint64_t done, std::uint64_t all) {
-      to_compute = all;
-      if (done == 0) progress.emplace(all);
-      if (done > 0) progress->show(done);
-    });
+    RunProgress progress;
+    tally = study::compute(study, folder, shard, command.threads,
+                           [&](std::uint64_t done, std::uint64_t all) { progress.show(done, of_all = all); });
     if (shard.of == 1) folder.merge({});
   } catch (const Interrupted& interrupted) {
     spdlog::warn(
         "interrupted after {} of {} runs. {} keeps each chunk that is complete ({} runs each); the same command goes "
         "on from there, and `abs_hil study status {}` shows how much is done",
-        interrupted.done, to_compute, path, study.script().chunk, path);
+        interrupted.done, of_all, path, study.script().chunk, path);
     return status_of(signalled());
   }
   if (tally.runs == 0 && shard.of == 1) {
@@ -101,8 +98,10 @@ int run_study(const StudyCommand& command) {
     return exit_completed;
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  cli::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
-             tally.runs, duration_text(spent_s), spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0,
+  const std::string now = tally.earlier > 0 ? fmt::format(", {} of them now", tally.runs) : "";
+  cli::print("study {}: {} runs{} in {}, {:.0f} runs/s; {}{} ended by a fault, {} refused\n", name_of(command.file),
+             tally.earlier + tally.runs, now, duration_text(spent_s),
+             spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0, now.empty() ? "" : "of these ",
              tally.faults, tally.refused);
   if (!tally.damaged.empty()) spdlog::warn("damaged chunks were computed anew: {}", study::list_of(tally.damaged));
   if (tally.refused > 0) {
@@ -198,29 +197,28 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
                     command.folder, command_line);
 }
 
-RunProgress::RunProgress(std::uint64_t runs) : runs_(runs), terminal_(isatty(STDERR_FILENO) == 1) {
-  note_signals(true);
-}
+RunProgress::RunProgress() : terminal_(isatty(STDERR_FILENO) == 1) { note_signals(true); }
 
 RunProgress::~RunProgress() {
   if (terminal_) std::fputs("\r\033[K", stderr);
 }
 
-void RunProgress::show(std::uint64_t done) {
+void RunProgress::show(std::uint64_t done, std::uint64_t all) {
   if (signalled() != rig::Reason::none) throw Interrupted{done};
   if (!terminal_) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
   const auto now = Clock::now();
   if (!lock || now - shown_ < least_pause) return;
   shown_ = now;
+  if (!earlier_) earlier_ = done;
   const double spent_s = std::chrono::duration<double>(now - start_).count();
-  const double rate_Hz = static_cast<double>(done) / spent_s;
+  const double rate_Hz = static_cast<double>(done - *earlier_) / spent_s;
   // Threads begin with many runs at once, which end together: the first seconds tell no rate.
-  const std::string left = spent_s < believable_after_s
-                               ? ""
-                               : fmt::format(", {:.0f} runs/s, {} left", rate_Hz,
-                                             duration_text(static_cast<double>(runs_ - done) / rate_Hz));
-  cli::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
+  const std::string left =
+      spent_s < believable_after_s
+          ? ""
+          : fmt::format(", {:.0f} runs/s, {} left", rate_Hz, duration_text(static_cast<double>(all - done) / rate_Hz));
+  cli::print(stderr, "\r\033[K{} of {} runs{}", done, all, left);
   std::fflush(stderr);
 }
 

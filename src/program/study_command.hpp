@@ -63,18 +63,17 @@ struct Interrupted {
 /// ends the program at once. Thread-safe.
 class RunProgress {
  public:
-  /// @param runs  that will be done
-  explicit RunProgress(std::uint64_t runs);
+  RunProgress();
   /// Clears the line.
   ~RunProgress();
-  /// @throws Interrupted  after a signal
-  void show(std::uint64_t done);
+  /// The first call begins the count of what is done now. @throws Interrupted  after a signal
+  void show(std::uint64_t done, std::uint64_t all);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  std::uint64_t runs_;
   bool terminal_;
+  std::optional<std::uint64_t> earlier_{};
   Clock::time_point start_{Clock::now()};
   Clock::time_point shown_{};
   std::mutex mutex_{};

@@ -80,6 +80,7 @@ int init_rig(const config::Settings& settings, const std::string& name) {
 
 Action add_validate(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<config::Sources>();
+  o->asks_board = false;  // a question would disturb a run that drives it
   const auto schema = std::make_shared<bool>(false);
   parser.add("EXPERIMENT", &o->experiment, "experiment by name or TOML file", {.type = "NAME|FILE"});
   parser.add("--schema", schema.get(), "print the JSON Schema of experiment files instead");

@@ -41,10 +41,13 @@ template <typename Names>
   return best;
 }
 
-/// "; the nearest is NAME" for an unknown name that looks like one of `names`: at most half of its letters differ.
-/// Otherwise empty, since a name that is not like it would only mislead.
+/// "; the nearest is NAME" for an unknown name that looks like one of `names`: it begins one, or at most half of its
+/// letters differ. Otherwise empty, since a name that is not like it would only mislead.
 template <typename Names>
 [[nodiscard]] std::string nearest_hint(std::string_view name, const Names& names) {
+  for (const std::string_view candidate : names) {
+    if (name.size() > 2 && candidate.starts_with(name)) return "; the nearest is " + std::string(candidate);
+  }
   const std::string_view nearest = nearest_name(name, names);
   if (nearest.empty() || 2 * edit_distance(name, nearest) > name.size()) return {};
   return "; the nearest is " + std::string(nearest);

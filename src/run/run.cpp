@@ -310,6 +310,9 @@ RunOutcome Run::run_realtime(const Poll& poll) {
   }
   try {
     driver_.configure();
+    // The guard expects the first cycle within a second.
+    if (second_offset_ns_ >= 0)
+      clock_.sleep_until(next_second_ns(clock_.now_ns() + start_margin_ns) + second_offset_ns_ - rig::ns_per_s / 2);
     if (guard_ != nullptr) {
       guard_->arm(realtime_.scheduling);
       driver_.tell_before_making_safe(guard_);

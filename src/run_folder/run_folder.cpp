@@ -18,10 +18,10 @@
 #include <sys/utsname.h>
 #endif
 
-#include "abs_hil_revision.hpp"
 #include "files/result_file.hpp"
 #include "rig/error_words.hpp"
 #include "run_folder/sha256.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil::run_folder {
 
@@ -149,17 +149,8 @@ std::string sha256_of(std::string_view text) {
   return sum.hex();
 }
 
-BuildFacts build_facts() {
-#ifdef __clang__
-  const std::string compiler = "clang " __clang_version__;
-#else
-  const std::string compiler = "gcc " __VERSION__;
-#endif
-  return {ABS_HIL_VERSION, ABS_HIL_REVISION, ABS_HIL_BUILD_TYPE, compiler};
-}
-
 nlohmann::ordered_json environment_json(const RunEnvironment& run) {
-  const BuildFacts build = build_facts();
+  const version::BuildFacts build = version::build_facts();
   const System system = system_facts();
   std::error_code ignored;
   return {

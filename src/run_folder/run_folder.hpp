@@ -57,15 +57,6 @@ void check_seal(const std::filesystem::path& folder);
 /// SHA-256 of a text: 64 hexadecimal digits.
 [[nodiscard]] std::string sha256_of(std::string_view text);
 
-/// Facts about this program, fixed at build time.
-struct BuildFacts {
-  std::string version;
-  std::string git_revision;  ///< of the sources; ends in "-dirty" if they had changes; "unknown" outside git
-  std::string build_type;    ///< CMake's build type, as "Release"
-  std::string compiler;
-};
-[[nodiscard]] BuildFacts build_facts();
-
 /// What a run depended on besides its configuration.
 struct RunEnvironment {
   std::vector<std::string> command_line;

@@ -136,9 +136,13 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
   const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
   std::vector<std::uint64_t> damaged = damaged_of(chunks, folder);
   std::uint64_t all = 0;
-  for (const std::uint64_t chunk : chunks) all += folder.facts().runs_in(chunk);
-  const auto tell = [&progress, all](std::uint64_t done) {
-    if (progress) progress(done, all);
+  for (std::uint64_t chunk = 0; chunk < folder.facts().chunks(); ++chunk) {
+    if (shard.has(chunk)) all += folder.facts().runs_in(chunk);
+  }
+  std::uint64_t earlier = all;
+  for (const std::uint64_t chunk : chunks) earlier -= folder.facts().runs_in(chunk);
+  const auto tell = [&](std::uint64_t done) {
+    if (progress) progress(earlier + done, all);
   };
   tell(0);
   Counts counts;
@@ -147,7 +151,11 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
     compute_together(study, folder, std::span(chunks).subspan(at, std::min<std::size_t>(at_once, chunks.size() - at)),
                      threads > 0 ? threads : machine_threads(), counts, tell);
   }
-  return {.runs = counts.runs, .faults = counts.faults, .refused = counts.refused, .damaged = std::move(damaged)};
+  return {.earlier = earlier,
+          .runs = counts.runs,
+          .faults = counts.faults,
+          .refused = counts.refused,
+          .damaged = std::move(damaged)};
 }
 
 }  // namespace abs_hil::study

@@ -35,14 +35,15 @@ struct Shard {
 
 /// What became of runs.
 struct Tally {
+  std::uint64_t earlier{0};              ///< were there already; all others are those computed now
   std::uint64_t runs{0};
   std::uint64_t faults{0};               ///< ended early
   std::uint64_t refused{0};              ///< could not begin, for their combination of values
   std::vector<std::uint64_t> damaged{};  ///< chunks that were there, damaged, and are computed anew
 };
 
-/// Tells how many of all runs that have to be computed are done. Called from several threads, after each run, and once
-/// before the first.
+/// Tells how many of all runs of the shard are done, those of earlier calls among them. Called from several threads,
+/// after each run, and once before the first.
 using Progress = std::function<void(std::uint64_t done, std::uint64_t all)>;
 
 /// Computes the chunks of a shard that the folder lacks, and writes each as soon as it is finished. The bytes do not

@@ -17,6 +17,7 @@
 #include "rig/parse_json.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
+#include "version/build_facts.hpp"
 
 namespace abs_hil::study {
 
@@ -100,9 +101,8 @@ StudyFacts read_facts(const fs::path& folder) {
 }  // namespace
 
 StudyFacts facts_of(const Study& study, const std::string& name) {
-  const run_folder::BuildFacts build = run_folder::build_facts();
   const StudyScript& script = study.script();
-  StudyFacts facts{.program = fmt::format("abs_hil {} ({})", build.version, build.git_revision),
+  StudyFacts facts{.program = version::version_line("abs_hil"),
                    .name = name,
                    .text = script.text,
                    .description = script.description,

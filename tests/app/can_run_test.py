@@ -5,7 +5,7 @@ import subprocess
 import unittest
 
 from can_emulator import CanTest, skip_unless_possible
-from emulator_process import EMULATOR
+from emulator_process import EMULATOR, WAIVED_FOR_EMULATORS
 
 SAFE = (0.0, 0.0)
 # fault that the node has from its first second on, words on stderr
@@ -150,6 +150,14 @@ class CanRun(CanTest):
         result = self.run_program(*self.arguments(self.node('--lock-step')))
         self.assertEqual(result.returncode, 3)
         self.assertIn('an emulator in lock-step', result.stderr)
+
+    def test_a_node_without_the_mark_is_real_behind_a_socket_too(self):
+        node = self.node('--unmarked')
+        for args in WAIVED_FOR_EMULATORS:
+            with self.subTest(args):
+                result = self.run_program(*self.arguments(node, *args))
+                self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('inactive', node.command('status'))
 
     def test_bad_input(self):
         node = self.node()

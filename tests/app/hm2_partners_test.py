@@ -85,7 +85,7 @@ class Mesaflash(EmulatorTest):
 
     def test_mesaflash_sees_the_lie(self):
         self.start_emulator(EmulatorProcess, '--hm2', BOARD, '--board-name', '7I92', '--priority', 0, '--wrong-board',
-                            'one-counter')
+                            '0x458=0x01010204')
         self.assertIn('There are 1 of QCount', self.read_out())
 
 

@@ -12,7 +12,7 @@ import time
 import unittest
 
 from can_emulator import skip_unless_possible
-from emulator_process import EmulatorProcess, EmulatorTest
+from emulator_process import WAIVED_FOR_EMULATORS, EmulatorProcess, EmulatorTest
 from program import PROGRAM
 from resident_guardian import Group, Service, wait_until
 
@@ -100,6 +100,31 @@ class Hm2Run(EmulatorTest):
         for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
             self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
         self.assertEqual(board.wire(), SAFE)
+
+    def test_a_board_without_the_mark_is_real_at_this_computers_own_address_too(self):
+        board = self.board('--unmarked')
+        for args in WAIVED_FOR_EMULATORS:
+            with self.subTest(args):
+                result = self.run_program(*self.arguments(board, *args))
+                self.assertEqual(result.returncode, 2, result.stderr)
+        result = self.run_program(*self.arguments(board, '--rt', 'off'))
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn('commission', result.stderr)
+        self.assertIn('writes 0', board.command('status'))
+
+    def test_what_an_emulator_waives_is_said(self):
+        result = self.lock_step(self.board('--lock-step'), '--set', 'experiment.cut_speed_rad_s=10')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("the board carries an emulator's mark: no commissioning record", result.stderr)
+
+    def test_a_question_for_the_mark_does_not_take_a_board_from_another_program(self):
+        board = self.board()
+        program = self.start_real_time(board)
+        self.wait_for_drive(board, program)
+        result = self.run_program(*self.arguments(board))
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn('another program drives it', result.stderr)
+        program.kill()
 
     def test_latency_measures_the_wire_of_a_board_that_gets_only_zeros(self):
         board = self.board()

@@ -29,7 +29,7 @@ class NodeRun(hm2_run_test.Hm2Run):
         address = f'127.0.0.1:{hm2_run_test.free_port()}'
         for words, status, why in (
                 (('--node', ''), 2, '--node need a value'), (('--node', address, '--enable-line', 99), 2, 'output 0 alone'),
-                (('--node', address, '--wrong-board', 'no-pwm'), 2, 'give --hm2'),
+                (('--node', address, '--wrong-board', '0x100=0'), 2, 'give --hm2'),
                 (('--node', address, '--command', 'turn upper nan'), 2, 'not a finite number'),
                 (('--node', address, '--command', 'turn upper 1e300'), 2, '-100 to 100'),
                 (('--hm2', address, '--truth', '/dev/full'), 1, 'incomplete')):

@@ -3,6 +3,7 @@ import pathlib
 import re
 import unittest
 
+from emulator_process import WAIVED_FOR_EMULATORS
 from rig_emulator import RigTest, skip_unless_possible
 
 DOCUMENT = pathlib.Path(__file__).parents[2] / 'docs' / 'rig-setup.md'
@@ -123,11 +124,20 @@ class RigRun(RigTest):
     def test_fast_needs_an_emulator_in_lock_step(self):
         emulator = self.emulator()
         result = self.run_program('--backend', 'rig', '--fast', '--no-lcm', '--set', f'driver.pci.root={emulator.root}')
-        self.assertEqual(result.returncode, 2)
-        self.assertIn('driver.emulated=true', result.stderr)
-        result = self.lock_step(emulator)
         self.assertEqual(result.returncode, 3)
         self.assertIn('keeps its own time: it is hardware', result.stderr)
+
+    def test_a_card_without_the_mark_is_real(self):
+        emulator = self.emulator('--unmarked')
+        rig = ['--backend', 'rig', '--no-lcm', '--no-out', '--set', f'driver.pci.root={emulator.root}']
+        for args in WAIVED_FOR_EMULATORS:
+            with self.subTest(args):
+                result = self.run_program(*rig, *args)
+                self.assertEqual(result.returncode, 2, result.stderr)
+        result = self.run_program(*rig, '--rt', 'off')
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn('commission', result.stderr)
+        self.assertEqual(emulator.wire(), (0.0, 0.0))
 
 
 if __name__ == '__main__':

@@ -79,7 +79,7 @@ class Study(ProgramTest):
         self.assertIn('220 of 480 runs', status)
         self.assertIn('of these damaged: 2; the study computes them anew', status)
         whole = self.complete()
-        self.assertIn(f'{RUNS // 2 + 20} runs in', whole.stdout)
+        self.assertIn(f': {RUNS} runs, {RUNS // 2 + 20} of them now in', whole.stdout)
         self.assertIn('damaged chunks were computed anew: 2', whole.stderr)
         self.assertIn('complete', self.run_program('study', 'status', self.folder / 'whole').stdout)
         self.assertIn('complete already; results: ', self.complete().stdout)

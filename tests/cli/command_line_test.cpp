@@ -1,7 +1,9 @@
 // The parser of the command line: its answers, messages and statuses.
 #include "cli/command_line.hpp"
 
+#include <cstdlib>
 #include <iostream>
+#include <iterator>
 #include <sstream>
 
 #include "catch.hpp"
@@ -192,7 +194,7 @@ TEST_CASE("a row may require values") {
   CHECK(error_of(answer_of(row, {"a", "b", "c", "d"})) == "order: At Most 3 required but received 4");
 }
 
-TEST_CASE("a row may need or exclude another, in a group too") {
+TEST_CASE("a row may exclude another, in a group too") {
   const auto error = [](const std::vector<const char*>& arguments) {
     std::string can, truth;
     bool once = false;
@@ -202,17 +204,14 @@ TEST_CASE("a row may need or exclude another, in a group too") {
     board.add("--can", &can, "");
     parser.add("--truth", &truth, "", {.excludes = {"--can"}});
     parser.add("--once", &once, "");
-    parser.add("--wait", &wait, "", {.needs = {"--once"}, .excludes = {"--can", "--truth"}});
+    parser.add("--wait", &wait, "", {.excludes = {"--can", "--truth"}});
     return error_of(answer_of(parser, arguments));
   };
   CHECK(error({"--truth", "t", "--once"}) == "none");
   CHECK(error({"--truth", "t", "--can", "c"}) == "--truth excludes --can");
   CHECK(error({"--can", "c", "--once", "--wait", "1"}) == "--wait excludes --can");
   CHECK(error({"--truth", "t", "--once", "--wait", "1"}) == "--truth excludes --wait");
-  CHECK(error({"--wait", "1"}) == "--wait requires --once");
-  CHECK(error({"--wait", "1", "--once"}) == "none");
   bool flag = false;
-  CHECK_THROWS(answer_of({"--flag", &flag, "", {.needs = {"--nothing"}}}, {}));
   CHECK_THROWS(answer_of({"--flag", &flag, "", {.excludes = {"--nothing"}}}, {}));
 }
 
@@ -310,6 +309,69 @@ TEST_CASE("help and version go to the standard output and end the program well")
   const Answer version = answer_of(parser, {"--version"});
   CHECK(version.status == 0);
   CHECK(version.out == "1.2.3\n");
+}
+
+TEST_CASE("help is broken between words at the terminal's width, below the text of its row") {
+  std::string file;
+  cli::Parser parser("rig", "Drives the rig, and says in one long sentence what it does with it");
+  parser.add("--file", &file, "what the controller learns for the next braking on this rig, and no more than that");
+  parser.add("--fault", &file, "given as PHASE@SIGNAL:KIND[=PARAMETER][+DELAY] and so on");
+  const auto help_at = [&](const char* columns) {
+    ::setenv("COLUMNS", columns, 1);
+    const std::string help = answer_of(parser, {"--help"}).out;
+    ::unsetenv("COLUMNS");
+    return help;
+  };
+  CHECK(help_at("50") ==
+        "Drives the rig, and says in one long sentence what\n"
+        "it does with it\n"
+        "Usage: rig [OPTIONS]\n"
+        "\n"
+        "Options:\n"
+        "  -h,--help                   Print this help\n"
+        "      message and exit\n"
+        "  --file TEXT                 what the controller\n"
+        "      learns for the next braking on this rig,\n"
+        "      no more than that\n"
+        "  --fault TEXT                given as\n"
+        "      PHASE@SIGNAL:KIND[=PARAMETER][+DELAY] and so\n"
+        "      on\n"
+        "\n");
+  CHECK(help_at("62").find("\n                              the next braking on this rig,\n") != std::string::npos);
+  const auto words_of = [](const std::string& text) {
+    std::istringstream in(text);
+    return std::vector<std::string>{std::istream_iterator<std::string>(in), {}};
+  };
+  for (const char* columns : {"40", "41", "60", "61", "80", "1000", "0", "x"}) {
+    CAPTURE(columns);
+    const std::string help = help_at(columns);
+    CHECK(words_of(help) == words_of(help_at("400")));
+  }
+}
+
+TEST_CASE("a file to write has an ending of its format, a folder none; any other name is free") {
+  std::string csv, folder;
+  const Row file{"--csv", &csv, "", {.type = "FILE.csv|FILE.json"}};
+  const Row dir{"--out", &folder, "", {.type = "DIR"}};
+  for (const char* right : {"a.csv", "a.json", "a", "-", "/dev/stdout", "a.v2", "b.csv.d/a"}) {
+    CHECK(error_of(answer_of(file, {"--csv", right})) == "none");
+  }
+  CHECK(error_of(answer_of(file, {"--csv", "a.pdf"})) == "--csv: a.pdf: give FILE.csv|FILE.json");
+  CHECK(error_of(answer_of(dir, {"--out", "runs/a.b"})) == "none");
+  CHECK(error_of(answer_of(dir, {"--out", "runs/a.csv"})) == "--out: runs/a.csv: give DIR");
+}
+
+TEST_CASE("a word that people try is explained, and an unknown one has no help") {
+  cli::Parser parser("rig", "");
+  static_cast<void>(parser.add_subcommand("report", ""));
+  parser.explain("run", "run is no subcommand: type rig alone");
+  const std::string more = " (rig --help shows all options)\n";
+  CHECK(answer_of(parser, {"run"}).err == "rig: run is no subcommand: type rig alone" + more);
+  CHECK(answer_of(parser, {"run", "--help"}).err == "rig: run is no subcommand: type rig alone" + more);
+  const Answer near = answer_of(parser, {"rep", "--help"});
+  CHECK(near.status == 2);
+  CHECK(near.out.empty());
+  CHECK(near.err == "rig: unknown subcommand rep; the nearest is report; known: report" + more);
 }
 
 TEST_CASE("a program without a name is called what the user typed") {

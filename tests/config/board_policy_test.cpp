@@ -2,6 +2,7 @@
 #include "config/board_policy.hpp"
 
 #include <filesystem>
+#include <fstream>
 #include <initializer_list>
 #include <stdexcept>
 #include <string>
@@ -52,82 +53,71 @@ std::string an_adapter() {
 
 }  // namespace
 
-TEST_CASE("Hardware is not driven without a guardian, even where it is called an emulator") {
-  Asked run{"guardian.enabled=false"};
-  CHECK_THAT(run.refusal(), Contains("--set driver.emulated=true"));
-  run.driver.emulated = true;
-  run.driver.kind = "pci";
-  pci(run.driver).root = "/sys/bus/pci/devices";
-  CHECK_THAT(run.refusal(), Contains("driver.pci.root = /sys/bus/pci/devices is real hardware"));
-  pci(run.driver).root = "/tmp";
-  CHECK(run.refusal().empty());
-  run.driver.kind = "can";
-  can(run.driver).interface = "unix:/tmp/bus";
-  CHECK(run.refusal().empty());
+TEST_CASE("A real board is not driven without a guardian, and gets no faults; one that has shown the mark does") {
+  Asked unguarded{"guardian.enabled=false"};
+  CHECK_THAT(unguarded.refusal(), Contains("guardian.enabled = false") && Contains("emulator's mark"));
+  unguarded.driver.emulated = true;
+  CHECK(unguarded.refusal().empty());
+  Asked faulty{"run.inject=brake@encoder_upper:stuck"};
+  CHECK_THAT(faulty.refusal(), Contains("--inject") && Contains("never injected into real hardware"));
+  faulty.driver.emulated = true;
+  CHECK(faulty.refusal().empty());
 }
 
-TEST_CASE("A board is real unless its files, its interface or the configuration say that it is an emulator") {
+TEST_CASE("No key, no folder, no interface and no address make an emulator of a board") {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "abs_hil_unmarked_card";
+  const std::filesystem::path card = folder / "0000:03:00.0";
+  std::filesystem::create_directories(card);
+  const auto put = [&card](const char* name, const std::string& text) { std::ofstream(card / name) << text; };
+  put("vendor", "0x10b5\n");
+  put("device", "0x2497\n");
+  put("enable", "1\n");
+  const std::string none = "0x0000000000000000 0x0000000000000000 0x0000000000000000\n";
+  put("resource", none + none + "0x000000000000e000 0x000000000000e0ff 0x0000000000040101\n");
+  put("resource2", std::string(256, '\0'));
   driver::DriverOptions board;
   board.kind = "pci";
-  pci(board).root = "/sys/bus/pci/devices";
+  pci(board).root = folder;
+  config::learn_reality(board);
   CHECK(config::is_real_board(board));
-  board.emulated = true;  // the kernel's cards are real whatever the configuration says
-  CHECK(config::is_real_board(board));
-  board.emulated = false;
-  pci(board).root = "/tmp/emulated/pci";
+  board.emulated = true;  // demanded
+  CHECK_THROWS_WITH(config::learn_reality(board), Contains("driver.emulated = true demands an emulator") &&
+                                                      Contains("driver.pci.root = " + folder.string()));
+  put("resource2", "ABS-EMUL" + std::string(248, '\0'));
+  config::learn_reality(board);
   CHECK_FALSE(config::is_real_board(board));
+  std::filesystem::remove_all(folder);
 
-  board.kind = "can";
-  can(board).interface = "unix:/tmp/bus";
-  CHECK_FALSE(config::is_real_board(board));
-  can(board).interface = "an-interface-that-is-not-there";
-  CHECK(config::is_real_board(board));
-  board.emulated = true;
-  CHECK_FALSE(config::is_real_board(board));
-  board.emulated = false;
-  if (const std::string adapter = an_adapter(); !adapter.empty()) {
-    can(board).interface = adapter;
-    CHECK(config::is_real_board(board));
-  }
+  pci(board).root = "/sys/bus/pci/devices";  // the kernel's cards, whoever calls them what
+  CHECK_THROWS_WITH(config::learn_reality(board), Contains("holds the real cards"));
 
+  usb(board).sysfs_root = std::filesystem::temp_directory_path();
+  std::filesystem::create_directories(folder / "1-1");
+  std::ofstream(folder / "1-1/idVendor") << "1209\n";
+  std::ofstream(folder / "1-1/idProduct") << "0001\n";
+  std::ofstream(folder / "1-1/manufacturer") << "InTeCo\n";
+  std::ofstream(folder / "1-1/product") << "RT-DAC/USB2 emulator\n";
   board.kind = "usb";
-  CHECK(config::is_real_board(board));
-  board.emulated = true;
-  CHECK_FALSE(config::is_real_board(board));
+  usb(board).sysfs_root = folder;  // files that somebody has written, not the kernel's
+  CHECK_THROWS_WITH(config::learn_reality(board), Contains("driver.usb.sysfs_root"));
+  std::filesystem::remove_all(folder);
+
+  if (const std::string adapter = an_adapter(); !adapter.empty()) {
+    board.kind = "can";
+    can(board).interface = adapter;
+    CHECK_THROWS_WITH(config::learn_reality(board), Contains("is an adapter to a real bus"));
+  }
 }
 
-TEST_CASE("An adapter to a real bus is hardware") {
-  Asked run{"guardian.enabled=false"};
-  run.driver.emulated = true;
-  run.driver.kind = "can";
-  can(run.driver).interface = an_adapter();
-  if (can(run.driver).interface.empty()) {
-    WARN("this computer has no network adapter to try it with");
-    return;
+TEST_CASE("A silent board is real, unless somebody demands an emulator: its driver then refuses one without the mark") {
+  driver::DriverOptions board;
+  board.kind = "can";
+  can(board).interface = "unix:/tmp/abs_hil_no_such_bus";
+  for (const bool demanded : {false, true}) {
+    board.emulated = demanded;
+    config::learn_reality(board);
+    CHECK(config::is_real_board(board) != demanded);
   }
-  CHECK_THAT(run.refusal(), Contains("driver.can.interface = ") && Contains("is real hardware"));
-  run.s.guardian.enabled = true;
-  CHECK(run.refusal().empty());
-}
-
-TEST_CASE("Faults are injected into emulators alone") {
-  Asked run{"run.inject=brake@encoder_upper:stuck"};
-  CHECK_THAT(run.refusal(), Contains("--inject") && Contains("never injected into real hardware"));
-  run.driver.emulated = true;
-  run.driver.kind = "pci";
-  pci(run.driver).root = "/sys/bus/pci/devices";
-  CHECK_THAT(run.refusal(), Contains("driver.pci.root = /sys/bus/pci/devices holds the real cards"));
-  pci(run.driver).root = "/tmp";
-  CHECK(run.refusal().empty());
-  run.driver.kind = "can";
-  can(run.driver).interface = "unix:/tmp/bus";
-  CHECK(run.refusal().empty());
-  can(run.driver).interface = an_adapter();
-  if (can(run.driver).interface.empty()) {
-    WARN("this computer has no network adapter to try it with");
-    return;
-  }
-  CHECK_THAT(run.refusal(), Contains("is an adapter to a real bus; give a vcan interface"));
 }
 
 TEST_CASE("Hardware runs in real time, from standstill, and waits no longer than a period") {
@@ -199,7 +189,7 @@ TEST_CASE("A weak value on hardware needs a person's consent, and is told; an em
   CHECK(run.accepted.size() == 1);
   CHECK_THAT(run.accepted.at(0), Contains("guardian.insist_s = 0.001 weakens the protection"));
   run.s.unsafe.keys = "";
-  pci(run.driver).root = "/tmp";
+  run.driver.emulated = true;
   CHECK(run.refusal().empty());
   CHECK(run.accepted.empty());
 }
@@ -238,7 +228,7 @@ TEST_CASE("A weak value may have a flag of its own that consents") {
 
 TEST_CASE("The encoders' scale is the rig's, also on an emulated board") {
   Asked run{"model.encoder_counts_per_rev=2048"};
-  pci(run.driver).root = "/tmp";
+  run.driver.emulated = true;
   CHECK_THAT(run.refusal(), Contains("model.encoder_counts_per_rev = 2048") && Contains("give 4096 counts"));
   run.s.model.encoder_counts_per_rev = 4096;
   CHECK(run.refusal().empty());
@@ -252,7 +242,7 @@ TEST_CASE("A CAN node that would hold its outputs for long needs a person's cons
   node.s.unsafe.outputs_on_after_death = true;
   CHECK(node.refusal().empty());
   Asked emulated{"driver.kind=can"};
-  can(emulated.driver).interface = "unix:/tmp/bus";
+  emulated.driver.emulated = true;
   can(emulated.driver).watchdog_ms = 10'000;
   CHECK(emulated.refusal().empty());
 }

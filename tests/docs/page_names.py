@@ -8,7 +8,8 @@ Checks README.md, CONTRIBUTING.md and the pages in docs: what they name must exi
   - `folder/file` and `file.hpp` are files of the tree.
 Words with a place holder (capitals, *, {, <, …, `plant.x`) are left out. unchecked_names.txt lists what is named although no
 source contains it, with the reason; an entry that no page needs is an error. Links must lead to files, and docs/index.md, or a
-page that it leads to, must lead to every page. All pages together have at most WORDS_AT_MOST words, as `wc -w` counts.
+page that it leads to, must lead to every page. All pages together have at most WORDS_AT_MOST words, as `wc -w` counts. Outside of fences no two blank lines follow each
+other: they are where a sentence was cut.
 """
 import pathlib
 import re
@@ -51,6 +52,18 @@ def prose(text):
     """Without fences and indented blocks."""
     text = re.sub(r'^```.*?^```$', '', text, flags=re.MULTILINE | re.DOTALL)
     return '\n'.join('' if line.startswith('    ') else line for line in text.splitlines())
+
+
+def check_blank_lines(root):
+    wrong = []
+    for page in pages(root):
+        text = page.read_text(encoding='utf-8')
+        # A fence keeps its lines, so that the numbers are right.
+        text = re.sub(r'^```.*?^```$', lambda fence: re.sub(r'^$', '.', fence[0], flags=re.MULTILINE), text,
+                      flags=re.MULTILINE | re.DOTALL)
+        wrong += [f'{page.relative_to(root)}:{text.count(chr(10), 0, gap.start()) + 2}: two blank lines: say what was cut, or join'
+                  for gap in re.finditer(r'\n[ \t]*\n[ \t]*\n|\n[ \t]*\n\Z', text)]
+    return wrong
 
 
 class Sources:
@@ -166,6 +179,9 @@ def self_test():
         words = sum(len(page.read_text(encoding='utf-8').split()) for page in pages(root))
         assert check_words(root, words) == []
         assert check_words(root, words - 1) == [f'{words} words on all pages, above {words - 1}: say less, or say it once']
+        assert check_blank_lines(root) == []
+        page.write_text('one\n\n\ntwo\n\n```\n\n\n```\n', encoding='utf-8')
+        assert check_blank_lines(root) == ['docs/a.md:2: two blank lines: say what was cut, or join']
         assert check_links(root) == ['docs/alone.md: (none.md): no such file', 'docs/index.md: nothing leads to docs/alone.md']
 
 
@@ -180,7 +196,7 @@ def main():
     listed = subprocess.run([sys.argv[2], 'list', '--keys'], capture_output=True, text=True, check=True).stdout
     keys = [line.split()[0] for line in listed.splitlines() if re.match(r'^\w+\.\w', line)]
     wrong = check_names(root, Sources(root, keys), read_unchecked(pathlib.Path(__file__).with_name('unchecked_names.txt')))
-    wrong += check_links(root) + check_words(root)
+    wrong += check_links(root) + check_words(root) + check_blank_lines(root)
     print('\n'.join(wrong), file=sys.stderr)
     return 1 if wrong else 0
 

@@ -47,7 +47,7 @@ struct OutputGrid {
 /// What a board learns of the run besides its own options.
 struct RunFacts {
   bool lock_step{false};  ///< the driver advances an emulator's time (`--fast`)
-  bool emulated{false};   ///< driver.emulated
+  bool emulated{false};   ///< the run relies on an emulator: `configure` refuses a board without the mark of one
   double rate_Hz{1000.0};
   std::int32_t encoder_counts_per_rev{4096};
   bool hardware{false};                ///< for `check`: the board counts as hardware
@@ -55,11 +55,12 @@ struct RunFacts {
   bool beside_guardian{false};         ///< for the safe-state writer: it works although a guardian has the board
 };
 
-/// What the options of a board lead to. `unknown`: the options do not tell, so driver.emulated decides.
-enum class Reality : std::uint8_t { unknown, hardware, emulator };
+/// What the board itself shows. It is an emulator only if it carries a mark on the wire that no board on the market
+/// carries. `silent`: no board could be asked; `configure` asks again.
+enum class Reality : std::uint8_t { hardware, emulator, silent };
 struct BoardReality {
-  Reality reality{Reality::unknown};
-  std::string option{};  ///< of hardware: the option that tells, "driver.pci.root = /sys/bus/pci/devices"
+  Reality reality{Reality::hardware};
+  std::string option{};  ///< of hardware: the option that leads to it, "driver.pci.root = /sys/bus/pci/devices"
   std::string is{};      ///< of hardware: what it is, and the fix: "holds the real cards; give the emulator's folder"
 };
 
@@ -92,6 +93,7 @@ struct Backend {
   std::function<BoardReality(const BoardOptions&)> reality{};
   std::function<std::vector<FoundBoard>(const BoardOptions&)> find{};
   std::function<void(const BoardOptions&, const RunFacts&)> check{};
+  std::function<std::string(const BoardOptions&)> udp_peer{};
   std::vector<std::string_view> free_options{};
 };
 
@@ -108,13 +110,16 @@ struct BackendRow {
   /// Makes the writer with which a second process brings the board into the safe state.
   std::unique_ptr<SafeStateWriter> (*make_safe_state_writer)(const Options&, const RunFacts&);
   OutputGrid (*outputs)(const Options&);
-  /// Null: the options do not tell.
+  /// Asks the board for an emulator's mark, without an effect on it. Throws Unavailable if somebody drives it. Null: it
+  /// is hardware.
   BoardReality (*reality)(const Options&) = nullptr;
   /// Finds the boards that the options do not exclude. Null: it cannot look for boards; then there is one, which the
   /// options name.
   std::vector<FoundBoard> (*find)(const Options&) = nullptr;
   /// Checks options against the run. Throws std::invalid_argument. Null: nothing to check.
   void (*check)(const Options&, const RunFacts&) = nullptr;
+  /// Of a board that is reached by UDP: "ADDRESS:PORT". The guard finds a foreign writer by it.
+  std::string (*udp_peer)(const Options&) = nullptr;
   /// Names of options that say where the board is, or how patient the driver is. A commissioning of the board holds for
   /// any value of these, and only for the values of all others that it had. Caps may also be lower.
   std::vector<std::string_view> free_options = {};
@@ -155,6 +160,7 @@ Backend backend(const BackendRow<Options>& row, Options defaults) {
   if (row.reality != nullptr) entry.reality = with(row.reality);
   if (row.find != nullptr) entry.find = with(row.find);
   if (row.check != nullptr) entry.check = with(row.check);
+  if (row.udp_peer != nullptr) entry.udp_peer = with(row.udp_peer);
   entry.free_options = row.free_options;
   return entry;
 }

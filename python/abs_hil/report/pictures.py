@@ -4,7 +4,7 @@ import pathlib
 from functools import partial
 from typing import Any
 
-from ..files import refuse_existing, write_whole
+from ..files import make_folder, refuse_existing, write_whole
 from .model import Curve, Figure, Panel, phase_colour
 
 WIDTH_IN = 7.2
@@ -97,10 +97,7 @@ def _drawn(figure: Figure) -> Any:
 
 def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool) -> list[pathlib.Path]:
     """Writes the figures into `folder`, which it creates. Replaces an existing file only if asked. Raises ValueError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f'cannot create the folder "{folder}": {error.strerror}') from None
+    make_folder(folder, '--figures')
     paths = [folder / f'{figure.id}.{kind}' for figure in figures]
     for path in paths:
         refuse_existing(path, 'folder', replace)

@@ -7,6 +7,7 @@ from typing import Any
 
 from .. import parsers
 from ..core import load_network
+from ..files import refusal
 from ..options import failed
 from .feed import Feed, Live, Played
 from .runs import BIN_S, History
@@ -77,8 +78,7 @@ async def _serve(given: Any, source: Live | Played) -> int:
     try:
         await server.start()
     except OSError as error:
-        raise OSError(f'cannot listen at {given.host}, port {given.port}: {error.strerror}; give another --host or '
-                      '--port') from None
+        raise OSError(f'cannot listen at --host {given.host}, --port {given.port}: {refusal(error, given.host, "reach")}') from None
     print(f'abs_hil serve: {server.link}', flush=True)
     if foxglove is not None:
         print(f'abs_hil serve: for Foxglove, Lichtblick, PlotJuggler: {foxglove.link}', flush=True)

@@ -38,7 +38,7 @@ std::unique_ptr<RigDriver> make_can_driver(const CanOptions& options, const RunF
   can.encoder_counts_per_rev = run.encoder_counts_per_rev;
   can.rate_Hz = run.rate_Hz;
   return std::make_unique<CanDriver>(
-      can, [can] { return open_link(can); }, run.lock_step);
+      can, [can] { return open_link(can); }, run.lock_step, run.emulated);
 }
 
 std::unique_ptr<SafeStateWriter> make_can_writer(const CanOptions& options, const RunFacts& /*run*/) {
@@ -50,26 +50,41 @@ std::unique_ptr<SafeStateWriter> make_can_writer(const CanOptions& options, cons
       socket);
 }
 
-bool is_virtual(const std::string& interface) {
-  try {
-    const std::optional<InterfaceFacts> facts = find_interface(interface);
-    return facts && (facts->kind == "vcan" || facts->kind == "vxcan");
-  } catch (const Unavailable&) {
-    return false;
-  }
+/// An emulator's node says so in its identity.
+bool carries_mark(const Values& identity) {
+  return (identity.features & (feature::emulator | feature::lock_step)) != 0;
 }
 
-/// A network interface with a device behind it is an adapter, and a serial line may have an adapter behind it as well.
-/// Only vcan, vxcan and a socket in place of a bus are known to have none.
+/// The identity of the node on the bus; none: no node answers, or its bus cannot be opened.
+std::optional<Values> identity_on(const CanOptions& options) try {
+  const Link link = open_link(options);
+  std::optional<Values> found;
+  for (int attempt = 0; attempt < handshake_attempts && !found; ++attempt) {
+    static_cast<void>(link.socket->send(control_frame(Request::identify)));
+    static_cast<void>(link.socket->listen(monotonic_ns() + handshake_timeout_ns, [&found](const Frame& frame) {
+      const Decoded heard = decode(frame);
+      if (heard.error == DecodeError::none && heard.id == id::identity) found = heard.values;
+      return found.has_value();
+    }));
+  }
+  return found;
+} catch (const Unavailable&) {
+  return std::nullopt;
+}
+
+/// A network interface with a device behind it is an adapter to a real bus: it is not even asked.
 BoardReality can_reality(const CanOptions& options) {
-  if (options.interface.starts_with(unix_prefix)) return {.reality = Reality::emulator};
   std::error_code ignored;
   if (std::filesystem::exists("/sys/class/net/" + options.interface + "/device", ignored)) {
     return {.reality = Reality::hardware,
             .option = "driver.can.interface = " + options.interface,
             .is = "is an adapter to a real bus; give a vcan interface or an emulator's socket"};
   }
-  return {.reality = is_virtual(options.interface) ? Reality::emulator : Reality::unknown};
+  const std::optional<Values> identity = identity_on(options);
+  if (!identity) return {.reality = Reality::silent};
+  if (carries_mark(*identity)) return {.reality = Reality::emulator};
+  return {.option = "driver.can.interface = " + options.interface,
+          .is = "leads to a node whose ABS_IDENTITY does not say that it is an emulator"};
 }
 
 /// The node's watchdog is what ends its outputs if this computer dies.
@@ -90,11 +105,12 @@ std::string load_text(double rate_Hz, double bit_rate, double data_bit_rate, boo
 
 }  // namespace
 
-CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step)
+CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step, bool emulated)
     : BoardDriver(output_grid(options)),
       options_(options),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
+      emulated_(emulated),
       answer_timeout_ns_(answer_timeout_of(options, lock_step)),
       bucket_(options.loss_cost, options.loss_relief, options.loss_limit) {
   check_options("driver.can.", options);
@@ -148,6 +164,7 @@ void CanDriver::do_configure() {
     throw Unavailable(node + " has protocol version " + std::to_string(identity_.protocol) + ", this program needs " +
                       std::to_string(protocol_version) + ": update the node's firmware (docs/can.md)");
   }
+  require_mark("the node on " + link_.place, emulated_, carries_mark(identity_));
   const bool waits_for_lock_step = (identity_.features & feature::lock_step) != 0;
   require_lock_step("the node on " + link_.place, lock_step_, waits_for_lock_step);
   const bool node_can_fd = (identity_.features & feature::can_fd) != 0;

@@ -136,7 +136,8 @@ class CanDriver final : public BoardDriver {
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link  called by `configure`; throws Unavailable
   /// @param lock_step  this driver advances the time of the node, which must be an emulator in lock-step
-  CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step);
+  /// @param emulated  the node must carry the mark of an emulator
+  CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step, bool emulated = false);
   ~CanDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
@@ -198,6 +199,7 @@ class CanDriver final : public BoardDriver {
   CanOptions options_;
   OpenLink open_link_;
   bool lock_step_;
+  bool emulated_;
   std::int64_t answer_timeout_ns_;
   Link link_{};
   bool fd_{false};

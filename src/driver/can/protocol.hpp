@@ -48,6 +48,7 @@ enum class NodeState : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 namespace feature {
 inline constexpr std::int64_t lock_step = 1U << 0U;  ///< an emulator whose time ABS_TIME advances
 inline constexpr std::int64_t can_fd = 1U << 1U;
+inline constexpr std::int64_t emulator = 1U << 2U;  ///< no firmware sets it
 }  // namespace feature
 
 /// The node sends STATUS and OUTPUTS with every n-th answer.

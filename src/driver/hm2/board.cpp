@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint32_t cookie_value = 0x55AACAFE;
 constexpr unsigned most_modules = 32;
-constexpr unsigned most_instances = 32;
+constexpr unsigned most_instances = 64;
 constexpr std::uint32_t first_base = 0x0800;  // the identity and the descriptors are below
 constexpr std::uint32_t end_of_space = 0x10000;
 
@@ -39,6 +39,13 @@ const std::array<Known, 4>& known_modules() {
       {tag::counter, "quadrature counter", {2, 3, 0x83}, 5, 0x03, 2, &Board::counter},
       {tag::pwm, "PWM", {0, 1}, 5, 0x03, 2, &Board::pwm},
   }};
+  return known;
+}
+
+/// Takes the place of the plain counters. The time stamps of version 2 are wrong (LinuxCNC's encoder.c).
+const Known& multiplexed_counter() {
+  static const Known known{tag::muxed_counter, "multiplexed (MuxedQCount) counter", {3, 4, 0x84}, 5, 0x03, 4,
+                           &Board::counter};
   return known;
 }
 
@@ -131,6 +138,7 @@ class Reader {
 
   using Strides = std::array<std::uint32_t, 2>;
   void read_modules(std::uint32_t place, const Strides& instance_strides, const Strides& register_strides) {
+    std::vector<std::uint32_t> multiplexed;
     for (unsigned i = 0; i < most_modules; ++i) {
       const auto word = words(place + 12 * i, 3);
       const auto its_tag = static_cast<std::uint8_t>(word[0]);
@@ -141,17 +149,25 @@ class Reader {
       for (const Known& known : known_modules()) {
         if (known.tag == its_tag) take_module(known, word, instance_strides, register_strides);
       }
+      if (its_tag == tag::muxed_counter) multiplexed = word;
     }
-    for (const Known& known : known_modules()) {
-      const unsigned has = (board_.*known.place).instances;
-      if (has < known.least) {
-        refuse(formatted("it has %u %s%s, the rig needs %u", has, known.name, has == 1 ? "" : "s", known.least));
-      }
+    if (board_.counter.instances < 2 && !multiplexed.empty()) {
+      board_.counter = {};
+      board_.multiplexed = true;
+      take_module(multiplexed_counter(), multiplexed, instance_strides, register_strides);
+      require_enough(multiplexed_counter());
     }
+    for (const Known& known : known_modules()) require_enough(known);
     require_registers_apart();
     if (board_.port.instances != board_.ports) {
       refuse(formatted("it has %u I/O port instances and %u ports", board_.port.instances, board_.ports));
     }
+  }
+
+  void require_enough(const Known& known) const {
+    const unsigned has = (board_.*known.place).instances;
+    if (has >= known.least) return;
+    refuse(formatted("it has %u %s%s, the rig needs %u", has, known.name, has == 1 ? "" : "s", known.least));
   }
 
   void take_module(const Known& known, const std::vector<std::uint32_t>& word, const Strides& instance_strides,
@@ -239,12 +255,45 @@ Board read_board(Link& link, const std::string& place, std::uint32_t& number) {
 
 UsedPins find_pins(const Board& board, const Hm2Options& options) {
   using std::tuple;
+  // Multiplexed, two counters share pins.
+  const std::uint8_t counter = board.multiplexed ? tag::muxed_counter : tag::counter;
+  const auto unit_of = [&](std::int32_t channel) { return board.multiplexed ? channel / 2 : channel; };
+  const auto pin_of = [&](std::uint8_t of, std::uint8_t function, std::int32_t unit) {
+    const auto pin = std::ranges::find_if(
+        board.pins, [&](const Pin& p) { return p.tag == of && p.function == function && p.unit == unit; });
+    return pin == board.pins.end() ? -1 : static_cast<std::int32_t>(pin - board.pins.begin());
+  };
   for (const auto& [key, instance, module] : {tuple("drive_pwm", options.drive_pwm, &board.pwm),
                                               {"brake_pwm", options.brake_pwm, &board.pwm},
                                               {"lower_channel", options.lower_channel, &board.counter},
                                               {"upper_channel", options.upper_channel, &board.counter}}) {
-    if (static_cast<unsigned>(instance) < module->instances) continue;
-    refuse(formatted("driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance, module->instances - 1));
+    const std::string given = formatted("driver.hm2.%s = %d: ", key, instance);
+    if (static_cast<unsigned>(instance) >= module->instances) {
+      refuse(given + formatted("the board has the instances 0 to %u", module->instances - 1));
+    }
+    if (module == &board.pwm) {
+      if (pin_of(tag::pwm, pwm_output, instance) >= 0) continue;
+      std::string others;
+      for (std::int32_t n = 0; n < static_cast<std::int32_t>(module->instances); ++n) {
+        if (const auto pin = pin_of(tag::pwm, pwm_output, n); pin >= 0)
+          others += formatted("%s %d (I/O %d)", others.empty() ? "" : ",", n, pin);
+      }
+      refuse(given + "this firmware brings that PWM to no I/O pin, " +
+             (others.empty() ? "nor any other" : "but" + others));
+    }
+    if (board.multiplexed && instance % 2 == 0) {
+      refuse(given + formatted("this board's counters are multiplexed (MuxedQCount), and those of even numbers stop "
+                               "with the outputs: connect the wheels to odd ones, 1 to %u, and give their numbers",
+                               module->instances - 1));
+    }
+    for (const std::uint8_t line : {signal_a, signal_b}) {
+      if (pin_of(counter, line, unit_of(instance)) >= 0) continue;
+      refuse(given + "this firmware brings the signals A and B of that counter to no I/O pins");
+    }
+  }
+  const auto selects = [&](const Pin& pin) { return board.multiplexed && pin.tag == tag::muxed_select; };
+  if (board.multiplexed && std::ranges::none_of(board.pins, selects)) {
+    refuse("the hm2 board's counters are multiplexed, and no I/O pin selects one of them");
   }
   UsedPins used;
   PortWords counted{};
@@ -263,28 +312,24 @@ UsedPins find_pins(const Board& board, const Hm2Options& options) {
     word(used.outputs, pin) |= bit(pin);
     if (options.active_low) word(used.inverted, pin) |= bit(pin);
   };
-  std::int32_t drive_pin = -1;
-  std::int32_t brake_pin = -1;
   for (std::size_t i = 0; i < board.pins.size(); ++i) {
     const Pin& pin = board.pins[i];
-    const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
-    const bool drives = is_output && pin.unit == options.drive_pwm;
-    const bool brakes = is_output && pin.unit == options.brake_pwm;
-    const bool counts =
-        pin.tag == tag::counter && (pin.unit == options.lower_channel || pin.unit == options.upper_channel);
-    if (drives || brakes || counts) word(used.modules, i) |= bit(i);
+    const bool counts = pin.tag == counter &&
+                        (pin.unit == unit_of(options.lower_channel) || pin.unit == unit_of(options.upper_channel));
+    if (counts || selects(pin)) word(used.modules, i) |= bit(i);
     if (counts) word(counted, i) |= bit(i);
-    if (drives) drive_pin = static_cast<std::int32_t>(i);
-    if (brakes) brake_pin = static_cast<std::int32_t>(i);
+    if (selects(pin)) word(used.outputs, i) |= bit(i);
   }
-  for (const auto& [key, has, wanted] :
-       {tuple("drive_pin", drive_pin, options.drive_pin), {"brake_pin", brake_pin, options.brake_pin}}) {
-    if (has < 0 || (wanted >= 0 && wanted != has)) {
+  for (const auto& [key, pwm, wanted] : {tuple("drive_pin", options.drive_pwm, options.drive_pin),
+                                         {"brake_pin", options.brake_pwm, options.brake_pin}}) {
+    const std::int32_t has = pin_of(tag::pwm, pwm_output, pwm);
+    if (wanted >= 0 && wanted != has) {
       refuse(
-          formatted("driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): its firmware is another "
-                    "one; correct the key, or load G540x2",
+          formatted("driver.hm2.%s = %d, but the board has that PWM at I/O pin %d: its firmware is another one; "
+                    "correct the key, or load G540x2",
                     key, wanted, has));
     }
+    word(used.modules, static_cast<std::size_t>(has)) |= bit(static_cast<std::size_t>(has));
     claim(key, has);
   }
   for (const auto& [key, pin, words] :

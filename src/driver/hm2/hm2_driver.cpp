@@ -26,7 +26,12 @@ constexpr double answer_share = 0.8;  // of the period
 constexpr std::uint32_t unbuffered_12_bit = 0x03;
 constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
 constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
-constexpr std::uint32_t filter_at_25_MHz = 2;
+/// Of a counter's lines: the clock / (n + 2) is 25 MHz at 100 MHz. What multiplexes them takes longer: 8 MHz.
+std::uint32_t filter_of(const Board& board) {
+  constexpr double muxed_Hz = 8e6;
+  constexpr double usual = 2.0;
+  return static_cast<std::uint32_t>(board.multiplexed ? std::max(0.0, board.counter.clock_Hz / muxed_Hz - 2.0) : usual);
+}
 /// Register 1 of the ports at base 0x1000, in all firmware known to us.
 constexpr std::uint16_t usual_direction = 0x1100;
 
@@ -40,6 +45,31 @@ std::uint32_t watchdog_time(const Hm2Options& options, const Board& board) {
   return static_cast<std::uint32_t>(std::llround(1e-3 * options.watchdog_ms * board.watchdog.clock_Hz)) - 1;
 }
 
+/// What a board shows of itself before anybody relies on it.
+struct Mark {
+  bool emulator{false};    ///< space 5, which no board on the market has, gives its cookie
+  bool lock_step{false};   ///< and can be written: the board waits for its time
+  bool outputs_on{false};  ///< pins of the first two ports are outputs
+};
+std::optional<Mark> mark_of(Link& link, std::uint32_t& number) noexcept {
+  constexpr std::uint16_t cookie = 0x5A00 | space::emulator;
+  constexpr unsigned writable = 0x8000;
+  Packet packet;
+  const std::size_t pins_at = packet.read(space::hostmot2, usual_direction, 2);
+  const std::size_t facts_at = packet.read(space::info | space::emulator, 0, 2);
+  std::array<std::uint8_t, 12> answer{};
+  if (!ask(link, packet, answer, number)) return std::nullopt;
+  const bool emulator = word16(answer, facts_at) == cookie;
+  return Mark{.emulator = emulator,
+              .lock_step = emulator && (word16(answer, facts_at + 2) & writable) != 0,
+              .outputs_on = (word32(answer, pins_at) | word32(answer, pins_at + 4)) != 0};
+}
+
+/// No other program's numbers are likely to be near this one.
+std::uint32_t first_number() noexcept {
+  return static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 16U;
+}
+
 OpenLink opener(const Hm2Options& options) {
   return [address = parse_address(options.address)] { return std::make_unique<UdpLink>(address); };
 }
@@ -48,18 +78,40 @@ std::unique_ptr<RigDriver> make_driver(const Hm2Options& options, const RunFacts
   Hm2Options hm2 = options;
   hm2.encoder_counts_per_rev = run.encoder_counts_per_rev;
   hm2.rate_Hz = run.rate_Hz;
-  return std::make_unique<Hm2Driver>(hm2, opener(hm2), monotonic_ns, run.lock_step);
+  return std::make_unique<Hm2Driver>(hm2, opener(hm2), monotonic_ns, run.lock_step, run.emulated);
 }
 
 std::unique_ptr<SafeStateWriter> make_writer(const Hm2Options& options, const RunFacts& /*run*/) {
   return safe_state_writer(options, opener(options));
 }
 
-/// Nothing but an emulator answers at this computer's own address.
+std::string text_of(const sockaddr_in& address) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  ::inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
+  return formatted("%s:%u", text.data(), static_cast<unsigned>(ntohs(address.sin_port)));
+}
+
+[[noreturn]] void refuse_while_driven(const std::string& address) {
+  refuse(
+      "outputs of the hm2 board at " + address +
+      " are on (its DDR is not 0): another program drives it. End that one, or make the board safe with abs_hil safe "
+      "--set driver.kind=hm2");
+}
+
+/// A program that drives the board ends its outputs once it notices another one. So the first datagram looks at them.
 BoardReality reality(const Hm2Options& options) {
-  constexpr std::uint32_t loopback = 127;
-  const std::uint32_t address = ntohl(parse_address(options.address).sin_addr.s_addr);
-  return {.reality = address >> 24U == loopback ? Reality::emulator : Reality::unknown};
+  std::uint32_t number = first_number();
+  try {
+    const std::unique_ptr<Link> link = opener(options)();
+    const std::optional<Mark> mark = mark_of(*link, number);
+    if (!mark) return {.reality = Reality::silent};
+    if (mark->outputs_on) refuse_while_driven(options.address);
+    if (mark->emulator) return {.reality = Reality::emulator};
+  } catch (const NoSocket&) {
+    return {.reality = Reality::silent};
+  }
+  return {.option = "driver.hm2.address = " + options.address,
+          .is = "leads to a board without an emulator's mark (the cookie 0x5A05 of LBP16's space 5)"};
 }
 
 void check(const Hm2Options& options, const RunFacts& run) {
@@ -89,11 +141,12 @@ Packet safe_packet(const Board& board, const RegisterPair& pwm) noexcept {
   return packet;
 }
 
-Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step)
+Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step, bool emulated)
     : BoardDriver(output_grid(options), lock_step ? nullptr : read_clock),
       options_(options),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
+      emulated_(emulated),
       answer_timeout_ns_(answer_timeout_ns("driver.hm2.", options, answer_share)) {
   check_options("driver.hm2.", options);
 }
@@ -101,11 +154,12 @@ Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock re
 void Hm2Driver::do_configure() {
   link_.reset();
   link_ = std::make_unique<RecordedLink>(open_link_());
-  read_number_ = static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 16U;
-  const bool was_on = outputs_at_usual_place();
+  read_number_ = first_number();
+  const Mark mark = mark_of(*link_, read_number_).value_or(Mark{});
   board_ = read_board(*link_, options_.address, read_number_);
-  // A board in real time is not asked: what hardware answers there is not known.
-  if (lock_step_) require_lock_step("the hm2 board at " + options_.address, true, waits_for_time());
+  const std::string place = "the hm2 board at " + options_.address;
+  require_mark(place, emulated_, mark.emulator);
+  require_lock_step(place, lock_step_, mark.lock_step);
   pins_ = find_pins(board_, options_);
   const std::uint32_t rate = pwm_rate(options_, board_);
   constexpr std::uint32_t most_rate = 65535;
@@ -130,34 +184,16 @@ void Hm2Driver::do_configure() {
   stamp_tick_ns_ = (stamps_at_2_MHz + 2) * static_cast<double>(rig::ns_per_s) / board_.counter.clock_Hz;
   CycleAnswer answer;
   if (!ask_board(answer)) refuse("the hm2 board went silent");
-  if (!all_off(answer.direction) || (was_on && wire_.direction == usual_direction)) {
-    refuse("outputs of the hm2 board at " + options_.address +
-           " are on (its DDR is not 0): another program drives it. End that one, or make the board safe with abs_hil "
-           "safe --set driver.kind=hm2");
-  }
+  if (!all_off(answer.direction) || (mark.outputs_on && wire_.direction == usual_direction))
+    refuse_while_driven(options_.address);
 }
 
-/// A program that drives the board ends its outputs once it notices another one. So the first datagram looks at them.
-bool Hm2Driver::outputs_at_usual_place() noexcept {
-  constexpr unsigned ports = 2;
-  Packet packet;
-  const std::size_t where = packet.read(space::hostmot2, usual_direction, ports);
-  std::array<std::uint8_t, 4 * ports> answer{};
-  return ask(*link_, packet, answer, read_number_) && (word32(answer, where) | word32(answer, where + 4)) != 0;
-}
-
-bool Hm2Driver::waits_for_time() {
-  constexpr std::uint16_t cookie = 0x5A00 | space::lock_step;
-  Packet packet;
-  const std::size_t cookie_at = packet.read(space::info | space::lock_step, 0);
-  std::array<std::uint8_t, 2> answer{};
-  if (!ask(*link_, packet, answer, read_number_) || word16(answer, cookie_at) != cookie) return false;
+void Hm2Driver::learn_time() {
   Packet time;
-  time.read(space::lock_step, 0, 2);
+  time.read(space::emulator, 0, 2);
   std::array<std::uint8_t, 8> ns{};
-  if (!ask(*link_, time, ns, read_number_)) return false;
+  if (!ask(*link_, time, ns, read_number_)) return;
   emulated_ns_ = told_ns_ = static_cast<std::int64_t>(word32(ns, 0) | std::uint64_t{word32(ns, 4)} << 32U);
-  return true;
 }
 
 bool Hm2Driver::all_off(const PortWords& direction) const noexcept {
@@ -190,7 +226,7 @@ Packet Hm2Driver::set_up_packet() const noexcept {
   packet.write32(wire_.port_data, of_ports(none, board_));
   write_pair(packet, wire_.control, {count_filter, count_filter});
   packet.write32(board_.counter.address(reg::stamp_divisor), stamps_at_2_MHz);
-  packet.write32(board_.counter.address(reg::filter), filter_at_25_MHz);
+  packet.write32(board_.counter.address(reg::filter), filter_of(board_));
   packet.write32(board_.watchdog.address(reg::time), watchdog_time(options_, board_));
   packet.write32(wire_.bitten, 0);
   packet.write_number(at::write_number, write_number_);
@@ -250,7 +286,7 @@ void Hm2Driver::do_activate(std::int64_t now_ns) {
   last_.time_ns = now_ns;
   last_errno_ = 0;
   activated_ns_ = now_ns;
-  if (lock_step_) static_cast<void>(waits_for_time());
+  if (lock_step_) learn_time();
   // No other program's numbers are likely to be near this one.
   write_number_ = first_write_ = static_cast<std::uint32_t>(monotonic_ns() >> 8U) ^ 0x5EED0000U;
   constexpr int tries = 5;  // a slow computer may miss the watchdog's time between two datagrams
@@ -318,6 +354,7 @@ Backend hm2_backend() {
       .outputs = output_grid,
       .reality = reality,
       .check = check,
+      .udp_peer = [](const Hm2Options& options) { return text_of(parse_address(options.address)); },
       .free_options = {"address", "answer_timeout_us", "plausible_speed_rad_s"},
   });
 }

@@ -30,7 +30,7 @@ namespace space {
 inline constexpr unsigned hostmot2 = 0;  ///< 32 bit
 inline constexpr unsigned eeprom = 2;    ///< these and all below: 16 bit
 inline constexpr unsigned timers = 4;
-inline constexpr unsigned lock_step = 5;  ///< of emulators in lock-step alone: their time, ns, in two of 32 bit
+inline constexpr unsigned emulator = 5;  ///< of emulators alone; in lock-step their time, ns, in two of 32 bit
 inline constexpr unsigned status = 6;
 inline constexpr unsigned board_info = 7;
 inline constexpr unsigned info = 8;  ///< with one of them: about that space, from its cookie on, 16 bit
@@ -224,7 +224,12 @@ inline constexpr std::uint8_t watchdog = 2;
 inline constexpr std::uint8_t port = 3;
 inline constexpr std::uint8_t counter = 4;
 inline constexpr std::uint8_t pwm = 6;
+inline constexpr std::uint8_t muxed_counter = 12;
+inline constexpr std::uint8_t muxed_select = 13;
 }  // namespace tag
+// Functions of their pins.
+inline constexpr std::uint8_t signal_a = 1;
+inline constexpr std::uint8_t signal_b = 2;
 inline constexpr std::uint8_t pwm_output = 0x81;
 
 /// A board as it describes itself.
@@ -242,6 +247,9 @@ struct Board {
   Module port{};
   Module counter{};
   Module pwm{};
+  /// `counter` is the multiplexed kind: of two counters with the same pins the odd one counts while the select pin is
+  /// high, as it also is when nobody drives it; the even one counts only while the board drives this pin.
+  bool multiplexed{false};
   std::vector<Pin> pins{};
   std::vector<std::string> modules{};  ///< each in words
 };

@@ -216,11 +216,12 @@ std::vector<FoundBoard> survey_cards(const PciOptions& options) try {
   return {};  // no folder of PCI devices
 }
 
-Card open_card(const PciOptions& options, bool lock_step) {
+Card open_card(const PciOptions& options, bool lock_step, bool emulated) {
   const std::string bdf = choose(options);
   const fs::path folder = fs::path(options.root) / bdf;
   check_bar2(folder);
   refuse_obstacles(folder, card_obstacles(folder));
+  require_mark("the card in " + folder.string(), emulated, carries_mark(folder / "resource2").value_or(false));
   std::error_code ignored;
   require_lock_step("the card in " + folder.string(), lock_step, fs::exists(folder / emulated_time_file, ignored));
   Card card{.window = open_window(folder / "resource2"), .place = bdf + " in " + options.root, .address = bdf};

@@ -76,8 +76,7 @@ std::unique_ptr<RigDriver> make_pci_driver(const PciOptions& options, const RunF
   PciOptions pci = options;
   pci.encoder_counts_per_rev = run.encoder_counts_per_rev;
   return pci_driver(
-      pci, [pci, lock_step = run.lock_step] { return open_card(pci, lock_step); },
-      run.lock_step ? nullptr : monotonic_ns);
+      pci, [pci, run] { return open_card(pci, run.lock_step, run.emulated); }, run.lock_step ? nullptr : monotonic_ns);
 }
 
 bool is_of_the_kernel(const std::filesystem::path& file) {
@@ -85,15 +84,19 @@ bool is_of_the_kernel(const std::filesystem::path& file) {
   return std::filesystem::weakly_canonical(file, error).string().starts_with("/sys/") || error;
 }
 
-/// Files of the kernel belong to real cards, even where driver.emulated says otherwise, and even behind links from
-/// another folder. All other files are an emulator's.
+/// Files of the kernel belong to real cards, even behind links from another folder. Other files are an emulator's only
+/// if its registers carry the mark.
 BoardReality pci_reality(const PciOptions& options) {
-  bool real = is_of_the_kernel(options.root);
-  for (const FoundBoard& board : survey_cards(options)) real = real || is_of_the_kernel(board.files.front());
-  if (!real) return {.reality = Reality::emulator};
-  return {.reality = Reality::hardware,
-          .option = "driver.pci.root = " + options.root,
-          .is = "holds the real cards; give the emulator's folder"};
+  const BoardReality hardware{.option = "driver.pci.root = " + options.root,
+                              .is = "holds the real cards; give the emulator's folder"};
+  if (is_of_the_kernel(options.root)) return hardware;
+  bool found = false;
+  for (const FoundBoard& board : survey_cards(options)) {
+    const std::optional<bool> marked = carries_mark(board.files.front());
+    if (marked && !*marked) return hardware;
+    found = found || marked;
+  }
+  return {.reality = found ? Reality::emulator : Reality::silent};
 }
 
 std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t velocity_period_ticks) {

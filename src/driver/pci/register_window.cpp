@@ -1,10 +1,13 @@
 // Opens, locks, reads and writes the file of a card's registers.
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstdio>
@@ -184,6 +187,16 @@ IoError io_error_for(int errno_value) noexcept {
 
 std::unique_ptr<RegisterWindow> open_window(const std::filesystem::path& resource_file, WindowUse use) {
   return std::make_unique<SysfsWindow>(resource_file, use);
+}
+
+std::optional<bool> carries_mark(const std::filesystem::path& resource_file) {
+  const FileDescriptor file(::open(resource_file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct statfs system {};
+  if (file.get() < 0 || ::fstatfs(file.get(), &system) != 0) return std::nullopt;
+  if (system.f_type == SYSFS_MAGIC) return false;  // it is not even read
+  std::array<char, emulator_mark.size()> shown{};
+  const ssize_t size = ::pread(file.get(), shown.data(), shown.size(), 0);
+  return size == static_cast<ssize_t>(shown.size()) && std::string_view(shown.data(), shown.size()) == emulator_mark;
 }
 
 std::unique_ptr<EmulatedTime> open_emulated_time(const std::filesystem::path& file) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -151,7 +152,8 @@ struct Card {
 /// BAR, then opens and locks it. Writes nothing. Throws Unavailable with cause and fix.
 /// @param lock_step  advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
 ///                   emulator in lock-step is refused
-[[nodiscard]] Card open_card(const PciOptions& options, bool lock_step);
+/// @param emulated  the card must carry the mark of an emulator
+[[nodiscard]] Card open_card(const PciOptions& options, bool lock_step, bool emulated = false);
 
 /// Opens the registers of the same card for a guardian, without the owner's lock. Of the obstacles only those count
 /// that concern the ports: the others do not keep zeros from a card. Throws Unavailable, also if another guardian still
@@ -160,6 +162,12 @@ struct Card {
 /// @param file  becomes the file of the registers as soon as the card is found; null: not asked for
 [[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian = false,
                                                                 std::string* file = nullptr);
+
+/// What an emulator's file of registers answers to a read of 8 bytes at offset 0. The kernel refuses such a read of I/O
+/// ports, so no card can answer it.
+inline constexpr std::string_view emulator_mark = "ABS-EMUL";
+/// Whether a file of registers answers with the mark; none: it cannot be opened.
+[[nodiscard]] std::optional<bool> carries_mark(const std::filesystem::path& resource_file);
 
 /// File in the card's folder that only an emulator in lock-step has.
 inline constexpr const char* emulated_time_file = "emulated_time_ns";

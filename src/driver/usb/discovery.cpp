@@ -1,5 +1,7 @@
 // Finds the board in sysfs by its ids and names.
+#include <linux/magic.h>
 #include <linux/usb/ch9.h>
+#include <sys/vfs.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -79,13 +81,22 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
            "; choose one with --set driver.usb.serial=" + boards.front().serial);
   }
   const UsbDevice& board = boards.front();
-  if (emulated && board.product.find(emulator_mark) == std::string::npos) {
-    refuse("USB board " + board.text() + " (\"" + board.product +
-           "\") is not an emulator, but driver.emulated=true says so: remove that key");
-  }
+  require_mark("USB board " + board.text() + " (\"" + board.product + "\")", emulated, carries_mark(board));
   const bool waits_for_lock_step = board.product.ends_with(lock_step_mark);
   require_lock_step("USB board " + board.text(), lock_step, waits_for_lock_step, "--usb --lock-step");
   return board;
+}
+
+bool carries_mark(const UsbDevice& device) { return device.product.find(emulator_mark) != std::string::npos; }
+
+BoardReality usb_reality(const UsbOptions& options) {
+  const std::vector<UsbDevice> boards = find_boards(options);
+  if (boards.empty()) return {.reality = Reality::silent};
+  struct statfs system {};
+  const bool shown_by_kernel = ::statfs(options.sysfs_root.c_str(), &system) == 0 && system.f_type == SYSFS_MAGIC;
+  if (shown_by_kernel && std::ranges::all_of(boards, carries_mark)) return {.reality = Reality::emulator};
+  return {.option = "driver.usb.sysfs_root = " + options.sysfs_root,
+          .is = "shows a board whose product string is no emulator's, or is no folder of the kernel"};
 }
 
 std::string udev_rule(const UsbDevice& device) {

@@ -303,10 +303,10 @@ std::unique_ptr<RigDriver> make_usb_driver(const UsbOptions& options, const RunF
       usb, [usb, run] { return open_board(usb, run.lock_step, run.emulated); }, run.lock_step ? nullptr : monotonic_ns);
 }
 
-std::unique_ptr<SafeStateWriter> make_usb_writer(const UsbOptions& options, const RunFacts& run) {
-  return safe_state_writer(options, [options, run, again = Reopening{}]() mutable {
+std::unique_ptr<SafeStateWriter> make_usb_writer(const UsbOptions& options, const RunFacts& /*run*/) {
+  return safe_state_writer(options, [options, again = Reopening{}]() mutable {
     if (!again.due()) return Board{};
-    Board board = open_board(options, false, run.emulated);
+    Board board = open_board(options, false, false);  // zeros are for any board
     again.found(options.sysfs_root + '/' + board.address);
     return board;
   });
@@ -356,6 +356,7 @@ Backend usb_backend() {
       .make_driver = make_usb_driver,
       .make_safe_state_writer = make_usb_writer,
       .outputs = pwm_grid<UsbOptions>,
+      .reality = usb_reality,
       .find = survey_boards,
       .check = refuse_slow_answers,
       .free_options = {"sysfs_root", "device_root", "vendor_id", "product_id", "manufacturer", "serial", "version",

@@ -168,6 +168,10 @@ struct UsbDevice {
 inline constexpr const char* emulator_mark = "emulator";
 inline constexpr const char* lock_step_mark = "emulator in lock-step";
 
+[[nodiscard]] bool carries_mark(const UsbDevice& device);
+/// BackendRow::reality.
+[[nodiscard]] BoardReality usb_reality(const UsbOptions& options);
+
 /// Line for /etc/udev/rules.d that gives the group abs_hil access to the device.
 [[nodiscard]] std::string udev_rule(const UsbDevice& device);
 

@@ -44,14 +44,14 @@ State state_of(const std::string& bytes) {
   return state;
 }
 
-Component::Component(const std::string& token, const std::string& resources, Logger logger)
+Component::Component(const std::string& token, const std::filesystem::path& resources, Logger logger)
     : token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
   if (!model_ || token != token_of(kind_in(token), *model_)) {
     throw std::invalid_argument("the description (token " + token +
                                 ") does not belong to this binary; export the FMU again");
   }
-  const std::string path = resources + "/start.txt";
-  std::ifstream file(path);
+  const std::string path = (resources / "start.txt").string();
+  std::ifstream file(resources / "start.txt");
   if (!file) throw std::invalid_argument("cannot read the parameters in " + path);
   std::string line;
   for (const Variable& variable : model_->variables()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -24,7 +25,7 @@ using State = std::string;
 class Component {
  public:
   /// @param token  what the description says; @param resources  the folder of the FMU's resources
-  Component(const std::string& token, const std::string& resources, Logger logger);
+  Component(const std::string& token, const std::filesystem::path& resources, Logger logger);
 
   [[nodiscard]] const Variable& variable(std::uint32_t reference) const;
   /// The variable, whose value is about to be set. Throws for an output, and after the start for a parameter that is

@@ -34,7 +34,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
   };
   try {
     if (type != fmi2CoSimulation) throw std::invalid_argument("this FMU is for co-simulation only");
-    return new Component(guid, path_of(resources == nullptr ? "" : resources), logger);
+    return new Component(guid, resources_at(resources), logger);
   } catch (const std::exception& error) {
     logger(true, error.what());
     return nullptr;

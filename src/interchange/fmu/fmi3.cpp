@@ -43,7 +43,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     }
   };
   try {
-    return new Component(token, path_of(resources == nullptr ? "" : resources), logger);
+    return new Component(token, resources_at(resources), logger);
   } catch (const std::exception& error) {
     logger(true, error.what());
     return nullptr;
@@ -116,12 +116,12 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String, fmi3String, fmi3Strin
                                                fmi3LockPreemptionCallback, fmi3UnlockPreemptionCallback) {
   return nullptr;
 }
+#define ABS_HIL_AT const fmi3ValueReference[], size_t
 #define ABS_HIL_NOT_THERE(function, ...) \
-  fmi3Status function(__VA_ARGS__) { return not_there(instance, fmi3Error, #function); }
-#define ABS_HIL_NO_VALUES(type)                                                                                     \
-  ABS_HIL_NOT_THERE(fmi3Get##type, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3##type[], size_t) \
-  ABS_HIL_NOT_THERE(fmi3Set##type, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3##type[],   \
-                    size_t)
+  fmi3Status function(fmi3Instance i __VA_OPT__(, ) __VA_ARGS__) { return not_there(i, fmi3Error, #function); }
+#define ABS_HIL_NO_VALUES(type)                                      \
+  ABS_HIL_NOT_THERE(fmi3Get##type, ABS_HIL_AT, fmi3##type[], size_t) \
+  ABS_HIL_NOT_THERE(fmi3Set##type, ABS_HIL_AT, const fmi3##type[], size_t)
 ABS_HIL_NO_VALUES(Float32)
 ABS_HIL_NO_VALUES(Int8)
 ABS_HIL_NO_VALUES(UInt8)
@@ -130,54 +130,45 @@ ABS_HIL_NO_VALUES(UInt16)
 ABS_HIL_NO_VALUES(UInt32)
 ABS_HIL_NO_VALUES(Int64)
 ABS_HIL_NO_VALUES(UInt64)
-ABS_HIL_NOT_THERE(fmi3EnterEventMode, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3GetBinary, fmi3Instance instance, const fmi3ValueReference[], size_t, size_t[], fmi3Binary[],
+ABS_HIL_NOT_THERE(fmi3EnterEventMode)
+ABS_HIL_NOT_THERE(fmi3GetBinary, ABS_HIL_AT, size_t[], fmi3Binary[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetClock, ABS_HIL_AT, fmi3Clock[])
+ABS_HIL_NOT_THERE(fmi3SetBinary, ABS_HIL_AT, const size_t[], const fmi3Binary[], size_t)
+ABS_HIL_NOT_THERE(fmi3SetClock, ABS_HIL_AT, const fmi3Clock[])
+ABS_HIL_NOT_THERE(fmi3GetNumberOfVariableDependencies, fmi3ValueReference, size_t*)
+ABS_HIL_NOT_THERE(fmi3GetVariableDependencies, fmi3ValueReference, size_t[], fmi3ValueReference[], size_t[],
+                  fmi3DependencyKind[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetDirectionalDerivative, ABS_HIL_AT, ABS_HIL_AT, const fmi3Float64[], size_t, fmi3Float64[],
                   size_t)
-ABS_HIL_NOT_THERE(fmi3GetClock, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Clock[])
-ABS_HIL_NOT_THERE(fmi3SetBinary, fmi3Instance instance, const fmi3ValueReference[], size_t, const size_t[],
-                  const fmi3Binary[], size_t)
-ABS_HIL_NOT_THERE(fmi3SetClock, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3Clock[])
-ABS_HIL_NOT_THERE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference, size_t*)
-ABS_HIL_NOT_THERE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference, size_t[],
-                  fmi3ValueReference[], size_t[], fmi3DependencyKind[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference[], size_t,
-                  const fmi3ValueReference[], size_t, const fmi3Float64[], size_t, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference[], size_t,
-                  const fmi3ValueReference[], size_t, const fmi3Float64[], size_t, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3EnterConfigurationMode, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3ExitConfigurationMode, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Float64[],
-                  fmi3IntervalQualifier[])
-ABS_HIL_NOT_THERE(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3UInt64[],
-                  fmi3UInt64[], fmi3IntervalQualifier[])
-ABS_HIL_NOT_THERE(fmi3GetShiftDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3GetShiftFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, fmi3UInt64[],
-                  fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3SetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t,
-                  const fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3SetIntervalFraction, fmi3Instance instance, const fmi3ValueReference[], size_t,
-                  const fmi3UInt64[], const fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3Float64[])
-ABS_HIL_NOT_THERE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference[], size_t, const fmi3UInt64[],
-                  const fmi3UInt64[])
-ABS_HIL_NOT_THERE(fmi3EvaluateDiscreteStates, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3UpdateDiscreteStates, fmi3Instance instance, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*,
-                  fmi3Boolean*, fmi3Boolean*, fmi3Float64*)
-ABS_HIL_NOT_THERE(fmi3EnterContinuousTimeMode, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean, fmi3Boolean*, fmi3Boolean*)
-ABS_HIL_NOT_THERE(fmi3SetTime, fmi3Instance instance, fmi3Float64)
-ABS_HIL_NOT_THERE(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t*)
-ABS_HIL_NOT_THERE(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t*)
-ABS_HIL_NOT_THERE(fmi3EnterStepMode, fmi3Instance instance)
-ABS_HIL_NOT_THERE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference[], size_t,
-                  const fmi3Int32[], fmi3Float64[], size_t)
-ABS_HIL_NOT_THERE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference, fmi3Float64)
+ABS_HIL_NOT_THERE(fmi3GetAdjointDerivative, ABS_HIL_AT, ABS_HIL_AT, const fmi3Float64[], size_t, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3EnterConfigurationMode)
+ABS_HIL_NOT_THERE(fmi3ExitConfigurationMode)
+ABS_HIL_NOT_THERE(fmi3GetIntervalDecimal, ABS_HIL_AT, fmi3Float64[], fmi3IntervalQualifier[])
+ABS_HIL_NOT_THERE(fmi3GetIntervalFraction, ABS_HIL_AT, fmi3UInt64[], fmi3UInt64[], fmi3IntervalQualifier[])
+ABS_HIL_NOT_THERE(fmi3GetShiftDecimal, ABS_HIL_AT, fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3GetShiftFraction, ABS_HIL_AT, fmi3UInt64[], fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3SetIntervalDecimal, ABS_HIL_AT, const fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3SetIntervalFraction, ABS_HIL_AT, const fmi3UInt64[], const fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3SetShiftDecimal, ABS_HIL_AT, const fmi3Float64[])
+ABS_HIL_NOT_THERE(fmi3SetShiftFraction, ABS_HIL_AT, const fmi3UInt64[], const fmi3UInt64[])
+ABS_HIL_NOT_THERE(fmi3EvaluateDiscreteStates)
+ABS_HIL_NOT_THERE(fmi3UpdateDiscreteStates, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*,
+                  fmi3Float64*)
+ABS_HIL_NOT_THERE(fmi3EnterContinuousTimeMode)
+ABS_HIL_NOT_THERE(fmi3CompletedIntegratorStep, fmi3Boolean, fmi3Boolean*, fmi3Boolean*)
+ABS_HIL_NOT_THERE(fmi3SetTime, fmi3Float64)
+ABS_HIL_NOT_THERE(fmi3SetContinuousStates, const fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetContinuousStateDerivatives, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetEventIndicators, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetContinuousStates, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetNominalsOfContinuousStates, fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3GetNumberOfEventIndicators, size_t*)
+ABS_HIL_NOT_THERE(fmi3GetNumberOfContinuousStates, size_t*)
+ABS_HIL_NOT_THERE(fmi3EnterStepMode)
+ABS_HIL_NOT_THERE(fmi3GetOutputDerivatives, ABS_HIL_AT, const fmi3Int32[], fmi3Float64[], size_t)
+ABS_HIL_NOT_THERE(fmi3ActivateModelPartition, fmi3ValueReference, fmi3Float64)
 #undef ABS_HIL_NO_VALUES
 #undef ABS_HIL_NOT_THERE
+#undef ABS_HIL_AT
 
 }  // extern "C"

@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include "interchange/fmu/component.hpp"
+#include "rig/file_uri.hpp"
 
 namespace abs_hil::interchange::fmu {
 
@@ -87,27 +89,10 @@ void set_values(Component& component, const Reference* references, std::size_t c
   }
 }
 
-/// A path from an URI of FMI 2 such as file:///tmp/a%20b/resources or file:///C:/a.
-[[nodiscard]] inline std::string path_of(const std::string& uri) {
-  std::string rest = uri;
-  for (const char* prefix : {"file://localhost", "file://", "file:"}) {
-    if (rest.starts_with(prefix)) {
-      rest.erase(0, std::string(prefix).size());
-      break;
-    }
-  }
-  std::string path;
-  for (std::size_t n = 0; n < rest.size(); ++n) {
-    if (rest[n] == '%' && n + 2 < rest.size()) {
-      path += static_cast<char>(std::stoi(rest.substr(n + 1, 2), nullptr, 16));
-      n += 2;
-    } else {
-      path += rest[n];
-    }
-  }
-  if (path.size() > 2 && path[0] == '/' && path[2] == ':') path.erase(0, 1);  // a drive of Windows
-  while (path.size() > 1 && (path.back() == '/' || path.back() == '\\')) path.pop_back();
-  return path;
+/// The folder of an FMU's resources: FMI 2 gives its URI, FMI 3 its path.
+[[nodiscard]] inline std::filesystem::path resources_at(const char* place) {
+  const std::string path = rig::path_of_uri(place == nullptr ? "" : place);
+  return std::u8string(path.begin(), path.end());
 }
 
 }  // namespace abs_hil::interchange::fmu

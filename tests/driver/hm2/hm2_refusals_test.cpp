@@ -81,7 +81,7 @@ TEST_CASE("A board that describes what cannot be, or what is not known, is refus
                          Lie{0x46C, 0xFF, "bitmap 0xff"},
                          Lie{0x470, 0x02020006, "PWM module twice"},
                          Lie{0x600, 0x05000000, "pin 0 has the primary function 5"},
-                         Lie{0x604, 0x03000000, "drive_pin = 1, but the board has that PWM at I/O pin -1"},
+                         Lie{0x604, 0x03000000, "drive_pwm = 0: this firmware brings that PWM to no I/O pin, but 1 (I/O 18)"},
                          Lie{0x438, 0, "register stride 0"}}) {
     // clang-format on
     RegisterBoard board;

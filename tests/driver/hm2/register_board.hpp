@@ -113,8 +113,10 @@ class RegisterBoard final : public emulator::RigBehind {
   bool counts_udp{true};
   bool stamps_edges{true};
   std::uint32_t bitten{1};
-  std::array<std::uint32_t, 2> control{};  ///< bits that the counters report beside what was written
-  std::uint32_t broken_pins{0};            ///< pins of port 1 that never become outputs
+  std::array<std::uint32_t, 2> control{};            ///< bits that the counters report beside what was written
+  std::uint16_t counters{0x3000};                    ///< their base
+  std::array<unsigned, 2> counters_of_wheels{0, 1};  ///< of the lower and the upper one
+  std::uint32_t broken_pins{0};                      ///< pins of port 1 that never become outputs
   int time_jump_counts{0};
   std::uint16_t bites_after{0};  ///< so many packets: the program that drove it has ended its outputs; 0: never
   std::array<std::uint8_t, 0x20> info_{};
@@ -164,7 +166,17 @@ class RegisterBoard final : public emulator::RigBehind {
   }
   [[nodiscard]] std::uint32_t ticks(std::int64_t at_ns) const {
     if (!stamps_edges) return 0;
-    return static_cast<std::uint16_t>(at_ns / (10 * (std::int64_t{reg(0x3200)} + 2)));
+    return static_cast<std::uint16_t>(at_ns /
+                                      (10 * (std::int64_t{reg(static_cast<std::uint16_t>(counters + 0x200))} + 2)));
+  }
+  [[nodiscard]] std::uint32_t read_counter(std::uint16_t address) const {
+    const unsigned instance = (address & 0xFFU) / 4;
+    const bool upper = instance == counters_of_wheels[1];
+    if (address == counters + 0x300) return ticks(time_ns());
+    if (!upper && instance != counters_of_wheels[0]) return 0;
+    if ((address & 0xFF00) == counters) return count(upper) | ticks(edge_ns_[upper ? 1 : 0]) << 16U;
+    if ((address & 0xFF00) == counters + 0x100) return reg(address) | control[upper ? 1 : 0];
+    return 0;
   }
   std::uint32_t read(unsigned space, std::uint16_t address) {
     if (space == 0) {
@@ -173,12 +185,7 @@ class RegisterBoard final : public emulator::RigBehind {
         case 0x0D00: return bitten;
         case 0x1100: return ddr_[0];
         case 0x1104: return ddr_[1];
-        case 0x3000: return count(false) | ticks(edge_ns_[0]) << 16U;
-        case 0x3004: return count(true) | ticks(edge_ns_[1]) << 16U;
-        case 0x3100: return reg(0x3100) | control[0];
-        case 0x3104: return reg(0x3104) | control[1];
-        case 0x3300: return ticks(time_ns());
-        default: return 0;
+        default: return read_counter(address);
       }
     }
     const auto word = [&](const auto& bytes) {
