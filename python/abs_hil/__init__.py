@@ -17,8 +17,8 @@ from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 
 if TYPE_CHECKING:
     __version__: str
-    from .figures import FigureOfMerit, figures
     from .identification import Identified, identify
+    from .merits import FigureOfMerit, figures
     from .network import live
     from .recording import load, load_series
     from .run import Run, Series
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 globals().update(TYPES)
 
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
-_LATER = {'figures': ('FigureOfMerit', 'figures'),
+_LATER = {'merits': ('FigureOfMerit', 'figures'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
           'recording': ('load', 'load_series'),

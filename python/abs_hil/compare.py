@@ -17,7 +17,7 @@ import numpy as np
 
 from . import parsers
 from .estimates import Estimate, of_difference, of_mean, of_ratio
-from .figures import FigureOfMerit, figures
+from .merits import FigureOfMerit, figures
 from .options import failed
 
 #: figures whose ratio of adaptive to sliding-mode, paired by run, stands beside the paper's claim: by their key in JSON

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from .core import _core
-from .figures import figures, figures_of
 from .interchange.mcap_file import EVENT_TOPIC, McapContent
 from .interchange.messages import log_of
+from .merits import figures, figures_of
 from .messages import PHASES, REASONS, decode
 from .nesting import parse_json
 from .options import PathLike
@@ -233,6 +233,8 @@ def _load_log(place: pathlib.Path, name: str) -> Run:
         run.events.append(Event(event.time_s, event.kind, phase, event.reason_text, f'{event.value:.12g}', str(names[row]),
                                 event.message))
     check_times(np.array([event.time_s for event in run.events]), lambda row: f'{place}: event {row + 1}', rising=False)
+    if not messages['experiment_t']:
+        run.notes.append('the log does not describe the run: its names and its configuration are unknown')
     for told in messages['experiment_t'][:1]:
         run.summary = {one: getattr(told, one) for one in ('experiment', 'controller', 'plant', 'backend', 'version')}
         try:
@@ -244,7 +246,8 @@ def _load_log(place: pathlib.Path, name: str) -> Run:
         reason = REASONS.get(event.reason, {'kind': '', 'name': ''})
         result = 'completed' if reason['name'] == 'sequence_complete' else ends.get(reason['kind'])
         if result is not None:
-            run.summary.update(result=result, reason=event.reason_text)
+            _, found_words, value = event.message.partition(event.reason_text)
+            run.summary.update(result=result, reason=event.reason_text + value * bool(found_words))
             counts = ('cycles', 'overruns', 'telemetry_drops', 'publish_failures')
             run.summary.update((one, getattr(status, one)) for status in messages['status_t'][-1:] for one in counts)
             return _with_figures(run)

@@ -55,7 +55,7 @@ class _Text:
 
 def read_rows(path: str | os.PathLike[str], needed: Sequence[str] = CONTRACT, only: Collection[str] = ()) -> Rows:
     """A CSV as this program writes it, or a person or a spreadsheet: with a byte order mark, UTF-16, line ends of Windows,
-    fields in quotes, ';' or tabs beside decimal commas, comments (#), compressed by gzip. An empty field is unknown.
+    fields in quotes, ';' or tabs beside decimal commas, comments (#) at its beginning, gzip. An empty field is unknown.
 
     needed: the columns that it must have; without any its times are not checked. only: no others are read. Columns that
     hold nothing but texts are left out.
@@ -106,12 +106,12 @@ def _unzipped(content: bytes) -> tuple[bytes, bool]:
 
 
 def in_order(data: bytes) -> _Text:
-    """A text with points in its numbers, without quotes, comments and empty lines."""
+    """A text with points in its numbers, without quotes, empty lines, and comments before its first line."""
     separator, lines = '', []
     kept: list[str] = []
     for number, line in enumerate(data.decode('utf-8', 'surrogateescape').split('\n'), 1):
         line = line.rstrip('\r')
-        if line.startswith(('#', 'sep=')) or not line.strip(' \t,;"'):
+        if not line.strip(' \t,;"') or (not kept and line.startswith(('#', 'sep='))):
             continue
         separator = separator or next((one for one in '\t;' if one in line), ',')
         try:
@@ -132,42 +132,47 @@ def _rows(place: pathlib.Path, text: _Text, truncated: bool, needed: Sequence[st
         raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
                          f'{place}:1: no rows after the header: the file holds no data of the run')
     wanted = [number for number, name in enumerate(names) if name and (not only or name in only)]
-    numbers = {number for number in wanted if names[number] not in TEXTS}
+    ends = [line.rstrip(b'\r').split(text.separator.encode()) for line in (
+        text.data[first:text.data.index(b'\n', first)], text.data[text.data.rfind(b'\n', 0, -1) + 1:-1])]
+    words = [number for number in wanted if names[number] not in (*QUANTITIES, *TEXTS, *needed)
+             and not any(_is_number(row[number]) for row in ends if number < len(row))]
+    wanted = [number for number in wanted if number not in words]
     if not wanted:
         return Rows({}, truncated)
+    numbers = {number for number in wanted if names[number] not in TEXTS}
     try:
         rows = io.BytesIO(text.data)  # shares the bytes: a long run's rows fill the memory once
         rows.seek(first)
-        types = {number: np.float64 if number in numbers else str for number in wanted if names[number] in (*QUANTITIES, *TEXTS)}
         unknown: dict[int, list[str]] = {number: [] for number in range(len(names))}
         unknown.update((number, ['NaN', 'nan'] if names[number] == 'time_s' else ['NaN', 'nan', '']) for number in numbers)
-        frame = pandas.read_csv(rows, header=None, usecols=wanted, dtype=types, na_values=unknown, sep=text.separator,
-                                keep_default_na=False, float_precision='round_trip', low_memory=False, quoting=csv.QUOTE_NONE,
-                                skip_blank_lines=False, encoding_errors='surrogateescape')
+        frame = pandas.read_csv(rows, header=None, usecols=wanted, na_values=unknown, sep=text.separator, keep_default_na=False,
+                                dtype={number: np.float64 if number in numbers else str for number in wanted},
+                                float_precision='round_trip', quoting=csv.QUOTE_NONE, skip_blank_lines=False,
+                                encoding_errors='surrogateescape')
         # pandas refuses a line that is longer than the one before, and fills up a shorter one: then separators are missing.
         if text.data.count(text.separator.encode(), first) != len(frame) * (len(names) - 1):
             raise ValueError
     except ValueError as error:
         _refuse(place, text, first, names, numbers)
         raise ValueError(f'{place}: {error}') from None
-    columns, notes = {}, []
-    for number in wanted:
-        name, values = names[number], frame[number]
-        if number in numbers and not pandas.api.types.is_numeric_dtype(values.dtype):
-            if pandas.to_numeric(values, errors='coerce').notna().any() or name in needed:
-                _refuse(place, text, first, names, {number})
-            notes.append(f'column {name} of "{place}" holds texts and is left out')
-            continue
-        columns[name] = values.to_numpy(dtype=np.float64 if number in numbers else object)
+    columns = {names[number]: frame[number].to_numpy() for number in wanted}
     if needed:
-        for first, last in itertools.pairwise([*starts_of(columns), len(frame)]):
-            lines = text.lines[first + 1:last + 1]
-            check_times(columns['time_s'][first:last], lambda row, lines=lines: f'{place}:{lines[row]}')  # type: ignore[misc]
+        for begin, end in itertools.pairwise([*starts_of(columns), len(frame)]):
+            lines = text.lines[begin + 1:end + 1]
+            check_times(columns['time_s'][begin:end], lambda row, lines=lines: f'{place}:{lines[row]}')  # type: ignore[misc]
     for name in {*TEXTS} & {*columns}:
         texts = columns[name]  # few different ones
         clean = {one: _core.clean_text(str(one).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for one in set(texts)}
         columns[name] = np.array([clean[one] for one in texts], dtype=object)
-    return Rows(columns, truncated, notes)
+    return Rows(columns, truncated, [f'column {names[number]} of "{place}" holds texts and is left out' for number in words])
+
+
+def _is_number(field: bytes) -> bool:
+    try:
+        float(field or 0)
+        return True
+    except ValueError:
+        return False
 
 
 def _header(place: pathlib.Path, text: _Text, needed: Sequence[str]) -> tuple[list[str], int]:
@@ -191,13 +196,9 @@ def _refuse(place: pathlib.Path, text: _Text, first: int, names: list[str], numb
     for number, line in zip(text.lines[1:], text.data[first:].split(b'\n')[:-1]):
         fields = line.removesuffix(b'\r').split(text.separator.encode())
         for column, value in enumerate(fields[:len(names)]):
-            try:
-                if column in numbers and (value or names[column] == 'time_s'):
-                    float(value)
-            except ValueError:
-                shown = _core.clean_text(value, MOST_SHOWN)
-                raise ValueError(f'{place}:{number}: {names[column]}: "{shown}" is not a number (a run writes NaN for an unknown '
-                                 'value)') from None
+            if column in numbers and not _is_number(value or b'-' * (names[column] == 'time_s')):
+                raise ValueError(f'{place}:{number}: {names[column]}: "{_core.clean_text(value, MOST_SHOWN)}" is not a number (a '
+                                 'run writes NaN for an unknown value)')
         if len(fields) < len(names):
             raise ValueError(f'{place}:{number}: the row has {len(fields)} fields instead of {len(names)} and ends before '
                              f'{names[len(fields)]}')

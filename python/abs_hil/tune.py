@@ -13,8 +13,8 @@ from scipy.optimize import differential_evolution
 
 from . import parsers
 from .core import _core
-from .figures import OVERSHOOT
 from .files import make_folder, write_text, write_whole
+from .merits import OVERSHOOT
 from .options import failed, options
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 

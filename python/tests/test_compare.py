@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from abs_hil import compare, estimates
-from abs_hil.figures import figures
+from abs_hil.merits import figures
 
 NAN = math.nan
 

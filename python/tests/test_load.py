@@ -33,6 +33,29 @@ def test_folder_csv_and_log_are_the_simulated_run(folder):
     assert abs_hil.load(folder / 'run.lcmlog').config == simulated.config
 
 
+@pytest.mark.parametrize('arguments', [(), ('--controller', 'locked'), ('--set', 'telemetry.decimation=5')])
+def test_a_log_alone_gives_the_summary(tmp_path, abs_hil_program, arguments):
+    abs_hil_program('--fast', '--no-lcm', '--log', tmp_path / 'run.lcmlog', '--summary', tmp_path / 'summary.json', *arguments)
+    told, found = json.loads((tmp_path / 'summary.json').read_text()), abs_hil.load(tmp_path / 'run.lcmlog').summary
+    assert found['config'] == told['config']
+    assert {*found} - {*told} == {'version'}
+    figures = [name for name, figure in abs_hil.figures().items() if figure.in_summary]
+    assert len(figures) > 8
+    for name in figures if 'telemetry.decimation=5' not in arguments else ():  # that log has a fifth of the rows
+        assert found[name] == told[name], name
+    for name in ('result', 'reason', 'experiment', 'controller', 'plant', 'backend', 'cycles', 'overruns', 'telemetry_drops'):
+        assert found[name] == told[name], name
+
+
+@pytest.mark.parametrize('fault', ['accelerate@motor_pwm:off+0.5s', 'brake@encoder_upper:stuck+0.2s'])
+def test_a_log_says_how_its_run_ended_early(tmp_path, abs_hil_program, fault):
+    abs_hil_program('--fast', '--no-lcm', '--log', tmp_path / 'run.lcmlog', '--summary', tmp_path / 'summary.json',
+                    '--inject', fault, '--recorder', tmp_path, status=1)
+    told, run = json.loads((tmp_path / 'summary.json').read_text()), abs_hil.load(tmp_path / 'run.lcmlog')
+    assert (run.summary['result'], run.summary['reason']) == ('fault', told['reason']) and told['result'] == 'fault'
+    assert run.events[-1].event == 'fault' and told['reason'].startswith(run.events[-1].reason)
+
+
 def test_cut_off_files_say_so(folder):
     whole = abs_hil.load(folder)
     for name, words in (('run.csv', 'incomplete'), ('run.lcmlog', 'not used')):

@@ -266,7 +266,8 @@ def test_numbers_have_the_decimals_that_their_spread_tells():
 
 
 @pytest.mark.parametrize('arguments, words', [
-    (['--metric', 'nope'], '--metric nope'), (['--paper'], '--paper'), (['--csv'], 'give FILE.csv'), (['--label', 'x'], '--label')])
+    (['--metric', 'nope'], '--metric nope'), (['--paper'], '--paper'), (['--csv'], 'give FILE.csv'),
+    (['--label', 'x'], '--label')])
 def test_options_that_are_not_for_studies(folder, tmp_path, capsys, arguments, words):
     assert report.main([str(folder), '--output', str(tmp_path / 'r.html'), *arguments]) == 2
     assert words in capsys.readouterr().err

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from abs_hil.figures import OVERSHOOT
+from abs_hil.merits import OVERSHOOT
 from abs_hil.run import Run
 from abs_hil.simulation import simulate
 from abs_hil.tune import START_SPEED_RAD_S

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_hil.figures import OVERSHOOT, heading_of
+from abs_hil.merits import OVERSHOOT, heading_of
 
 from .criteria import ACTUATORS, PLANTS, Verdict
 from .laws import BASELINES, MAP_KEYS, PAPER_GAINS, Entry, entries, judge_entries, run_entries

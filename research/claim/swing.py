@@ -8,7 +8,7 @@ import tempfile
 
 import numpy as np
 
-from abs_hil.figures import OVERSHOOT
+from abs_hil.merits import OVERSHOOT
 
 from .criteria import SLIP_REF
 

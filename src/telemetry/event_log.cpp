@@ -27,6 +27,8 @@ constexpr std::uint32_t data_max_bytes = 1U << 28U;  // LCM's own limit
 
 /// A network may bring a message this many cycles late. A run that begins again goes further back, or to cycle 0.
 constexpr std::int64_t late_cycles = 200;
+/// No more go on at once, so that the time grows with the file alone.
+constexpr std::size_t recent_runs = 100;
 /// Times beyond this one are damaged.
 constexpr double latest_s = 2e9;
 
@@ -90,42 +92,29 @@ EventLogReader::Behind EventLogReader::look_behind(std::uint64_t end) {
   return Behind::recording;
 }
 
-/// The recording ends in the middle of a message, or is damaged.
-/// @param damage  why it is not only cut off; empty: it may be
-std::optional<LogEvent> EventLogReader::end_here(std::string damage) {
-  const Behind behind = look_behind(size_);
-  if (behind == Behind::recording) return next();
-  if (damage.empty() && behind == Behind::events) damage = "its length reaches beyond the end, but other events follow";
-  if (!damage.empty()) fail("the file is damaged: " + damage);
-  if (at_ == 0) fail("the file is cut off within its first message and holds nothing else");
-  note_cut("the file is cut off, as that of a program that was killed; it is read up to here");
-  header_read_ = 0;
-  return std::nullopt;
-}
-
-std::optional<LogEvent> EventLogReader::next() {
-  if (header_read_ == 0) return std::nullopt;
+/// Reads the event whose header is there, and the header behind it. Returns nothing if the event is whole, else why it
+/// is not; an empty text: the recording may be cut off there.
+std::optional<std::string> EventLogReader::read_event(LogEvent& event) {
   if (!header_begins()) {
     if (at_ == 0) fail("not an LCM event log; give a .lcmlog, as --log and lcm-logger write it");
-    return end_here(header_read_ < sizeof sync_word ? "" : "no event begins here");
+    return header_read_ < sizeof sync_word ? "" : "no event begins here";
   }
-  if (header_read_ != header_.size()) return end_here("");
-  LogEvent event;
+  if (header_read_ != header_.size()) return "";
   event.number = boost::endian::load_big_s64(&header_[4]);
   event.timestamp_us = boost::endian::load_big_s64(&header_[12]);
   const std::uint32_t channel_bytes = boost::endian::load_big_u32(&header_[20]);
   const std::uint32_t data_bytes = boost::endian::load_big_u32(&header_[24]);
   if (channel_bytes == 0 || channel_bytes > channel_max_bytes || data_bytes > data_max_bytes) {
-    return end_here("these lengths are not valid");
+    return "these lengths are not valid";
   }
   if (event.number == 0 && events_ > 0) {
     ++part_;
     events_ = 0;
   }
-  if (event.number < events_) return end_here("event number " + std::to_string(event.number));
+  if (event.number < events_) return "event number " + std::to_string(event.number);
   // Checked before memory is allocated, because a damaged length may have any value.
   const std::uint64_t end = at_ + event_header_bytes + channel_bytes + data_bytes;
-  if (size_ < end) return end_here("");
+  if (size_ < end) return "";
   event.part = part_;
   event.channel.resize(channel_bytes);
   event.data.resize(data_bytes);
@@ -134,13 +123,35 @@ std::optional<LogEvent> EventLogReader::next() {
     fail("it changed while it was read");
   }
   header_read_ = read_into(header_.data(), header_.size());
-  events_ = event.number == std::numeric_limits<std::int64_t>::max() ? event.number : event.number + 1;
-  // A cut message may have got its rest from an appended recording. Then no event begins behind it, or another one.
-  const auto following = boost::endian::load_big_s64(&header_[4]);
-  const bool goes_on = header_begins() && (header_read_ < header_.size() || following == 0 || following >= events_);
-  if (header_read_ > 0 && !goes_on && look_behind(end) == Behind::recording) return next();
-  at_ = end;
-  return event;
+  return std::nullopt;
+}
+
+std::optional<LogEvent> EventLogReader::next() {
+  while (header_read_ > 0) {
+    LogEvent event;
+    if (std::optional<std::string> damage = read_event(event)) {
+      const Behind behind = look_behind(size_);
+      if (behind == Behind::recording) continue;
+      if (damage->empty() && behind == Behind::events) {
+        damage = "its length reaches beyond the end, but other events follow";
+      }
+      if (!damage->empty()) fail("the file is damaged: " + *damage);
+      if (at_ == 0) fail("the file is cut off within its first message and holds nothing else");
+      note_cut("the file is cut off, as that of a program that was killed; it is read up to here");
+      header_read_ = 0;
+      return std::nullopt;
+    }
+    // A cut message may have got its rest from an appended recording. Then no event begins behind it, or another one.
+    const auto following = boost::endian::load_big_s64(&header_[4]);
+    const std::uint64_t end = at_ + event_header_bytes + event.channel.size() + event.data.size();
+    const bool goes_on =
+        header_begins() && (header_read_ < header_.size() || following == 0 || following > event.number);
+    if (header_read_ > 0 && !goes_on && look_behind(end) == Behind::recording) continue;
+    at_ = end;
+    events_ = event.number == std::numeric_limits<std::int64_t>::max() ? event.number : event.number + 1;
+    return event;
+  }
+  return std::nullopt;
 }
 
 std::string for_each_event(const std::filesystem::path& log, const std::function<void(const LogEvent&)>& take) {
@@ -155,7 +166,7 @@ std::size_t RunSeparator::run_of(const LogEvent& event) {
   // The run of this prefix, heard last, for which `is` is true.
   const auto find = [&](const auto& is) {
     Run* found = nullptr;
-    for (Run& run : runs_) {
+    for (Run& run : std::span(runs_).last(std::min(runs_.size(), recent_runs))) {
       if (run.prefix == prefix && is(run) && (found == nullptr || run.heard > found->heard)) found = &run;
     }
     return found;

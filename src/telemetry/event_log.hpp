@@ -53,8 +53,11 @@ class EventLogReader {
   std::size_t read_into(void* to, std::size_t size);
   [[nodiscard]] bool header_begins() const;
   Behind look_behind(std::uint64_t end);
-  void note_cut(const std::string& what) { cut_.append(cut_.empty() ? "" : "; ").append(place(what)); }
-  std::optional<LogEvent> end_here(std::string damage);
+  void note_cut(const std::string& what) {
+    constexpr std::size_t longest = 1000;
+    if (cut_.size() < longest) cut_.append(cut_.empty() ? "" : "; ").append(place(what));
+  }
+  std::optional<std::string> read_event(LogEvent& event);
 
   std::filesystem::path path_;
   std::ifstream file_;

@@ -132,6 +132,16 @@ TEST_CASE("a recording that was appended to another one is read whole, wherever 
   }
 }
 
+TEST_CASE("any number of recordings that are cut off at once is read") {
+  const abs_hil::test::TemporaryFolder scratch;
+  std::string many;
+  for (int n = 0; n < 100'000; ++n) many.append("\xED\xA1\xDA\x01").append(8, '\0');
+  put(scratch / "x.lcmlog", many);
+  const Found found = read(scratch / "x.lcmlog");
+  CHECK(found.events.empty());
+  CHECK(found.cut.size() < 2000);
+}
+
 TEST_CASE("damage in the middle is no appended recording") {
   const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", 10);

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from ..core import _core
-from ..figures import OVERSHOOT
 from ..interchange.host import made
+from ..merits import OVERSHOOT
 from ..options import Value, options
 from ..simulation import Study, keys, simulate, simulate_many
 from .bounds import coasted, identity

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from ..figures import number_in
+from ..merits import number_in
 from ..nesting import parse_toml
 from ..recording import CSV, kind_of, load, named, read_events, rows_of, run_names, runs_in_series
 from ..rows import Rows

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..estimates import Estimate, of_mean
-from ..figures import FigureOfMerit, figures
+from ..merits import FigureOfMerit, figures
 from .files import RunFiles, differing_keys
 from .model import Curve, Figure, Label, Panel, Style
 from .survey import Survey, merits_shown, value_of

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import _core
-from ..figures import PAPER_R2_M, FigureOfMerit, figures, figures_of, r2_m
+from ..merits import PAPER_R2_M, FigureOfMerit, figures, figures_of, r2_m
 from ..rows import TEXTS, Rows
 from ..run import signals_of
 from .files import RunFiles

@@ -188,8 +188,8 @@ class Played:
     """Packets of a recording, at the pace at which they were recorded, times `speed`; 0: at once. Raises ValueError for what
     is no recording, and for one of several rigs at once of which none is named."""
 
-    def __init__(self, name: str, speed: float) -> None:
-        self._events = recorded_packets(name)
+    def __init__(self, name: str, speed: float, prefix: str = '') -> None:
+        self._events = recorded_packets(name, prefix)
         self._next = next(self._events, None)
         if self._next is None:
             raise ValueError(f'"{name}" holds no message of abs_hil; `abs_hil log info {name}` lists what it holds')
@@ -206,19 +206,19 @@ class Played:
         return found
 
 
-def recorded_packets(name: str) -> Iterator[tuple[int, str, bytes]]:
-    """(time in us, channel, data) of our messages in an event log, up to the first place that is damaged; of another
-    recording those that its rows and events make."""
+def recorded_packets(name: str, prefix: str = '') -> Iterator[tuple[int, str, bytes]]:
+    """(time in us, channel, data) of our messages of this prefix in an event log, up to the first place that is damaged; of
+    another recording those that its rows and events make."""
     place, number = named(name)
     place = place / 'run.lcmlog' if (place / 'run.lcmlog').is_file() else place
     if kind_of(place) != LOG:
         yield from messages_of(load(name))
         return
-    runs = {(run, channel) for run, *_, channel, _ in _events(place) if channel.endswith('TELEMETRY')}
-    if number or len({channel for _, channel in runs}) > 1:
-        number = _core.chosen_run(os.fsencode(name), len(runs)) + 1
+    runs = {run: channel for run, *_, channel, _ in _events(place) if channel.endswith('TELEMETRY')}
+    if number or len({channel for channel in runs.values() if channel.startswith(prefix)}) > 1:
+        number = _core.chosen_run(os.fsencode(name), max(runs, default=-1) + 1) + 1
     for run, _, _, time_us, channel, data in _events(place):
-        if number in (0, run + 1) and is_ours(data):
+        if number in (0, run + 1) and channel.startswith(prefix) and is_ours(data):
             yield time_us, channel, data
 
 

@@ -42,7 +42,12 @@ def _source(given: Any) -> Live | Played:
         raise ValueError(f'--speed {given.speed:g}: give a number in [0, 1000]')
     if given.foxglove is not None and given.speed == 0:
         raise ValueError('--foxglove shows what comes while it is looked at: give --speed above 0')
-    return Played(given.log, given.speed)
+    return Played(given.log, given.speed, _prefix(given))
+
+
+def _prefix(given: Any) -> str:
+    """Of the messages to show; of a recording all, unless a prefix is given."""
+    return '' if given.log is not None and given.prefix == parsers.serve().get_default('prefix') else str(given.prefix)
 
 
 def _sender(given: Any) -> Command:
@@ -60,7 +65,7 @@ def _sender(given: Any) -> Command:
 
 async def _serve(given: Any, source: Live | Played) -> int:
     """Serves until a signal comes; its number."""
-    feed = Feed(History(), given.prefix if given.log is None else '')
+    feed = Feed(History(), _prefix(given))
     # Another user of this computer could connect to its own address too, so commands always need the token.
     token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
     shown = given.log or given.lcm_url or 'LCM'

@@ -11,7 +11,7 @@ import numpy as np
 import pandas
 
 from ..core import _core
-from ..figures import figures, heading_of, with_unit
+from ..merits import figures, heading_of, with_unit
 from ..messages import REASONS
 from ..report.model import run_style
 from ..report.page import render
