@@ -31,7 +31,8 @@ toml::table parse(const fs::path& file) {
   try {
     std::ifstream in(file, std::ios::binary);
     if (!in)
-      throw ConfigError(fmt::format("{}: cannot be read: {}", file.string(), rig::refusal(errno, file, rig::reading)));
+      throw ConfigError(
+          fmt::format("{}: cannot be read: {}", file.string(), rig::refusal(errno, file.string(), rig::reading)));
     return rig::parse_toml(in, file.string());
   } catch (const toml::parse_error& problem) {
     throw ConfigError(

@@ -69,7 +69,7 @@ RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
   fs::create_directories(path_, error);
   if (error) {
     throw FolderError(fmt::format("--out: cannot create \"{}\": {}", path_.string(),
-                                  rig::refusal(error.value(), path_, rig::writing)));
+                                  rig::refusal(error.value(), path_.string(), rig::writing)));
   }
   if (!fs::is_empty(path_, error) || error) {
     throw FolderError(fmt::format("--out: \"{}\" is not empty, and nothing is overwritten; give a new or empty folder",
@@ -138,7 +138,7 @@ std::string sha256_of_file(const std::filesystem::path& path) {
   }
   if (!file.eof()) {
     throw FolderError(fmt::format("cannot read \"{}\": {}", path.string(),
-                                  rig::refusal(errno != 0 ? errno : EIO, path, rig::reading)));
+                                  rig::refusal(errno != 0 ? errno : EIO, path.string(), rig::reading)));
   }
   return sum.hex();
 }

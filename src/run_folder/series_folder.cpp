@@ -22,7 +22,7 @@ void move_to(const fs::path& from, const fs::path& to) {
   fs::rename(from, to, error);
   if (error) {
     throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(),
-                                  rig::refusal(error.value(), to, rig::writing)));
+                                  rig::refusal(error.value(), to.string(), rig::writing)));
   }
 }
 

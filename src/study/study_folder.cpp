@@ -126,7 +126,7 @@ StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path
   fs::create_directories(path_, error);
   if (error) {
     throw config::ConfigError(fmt::format("{}: cannot create this folder: {}", path_.string(),
-                                          rig::refusal(error.value(), path_, rig::writing)));
+                                          rig::refusal(error.value(), path_.string(), rig::writing)));
   }
   if (fs::is_regular_file(path_ / file::index, error)) {
     const StudyFacts there = read_facts(path_);
