@@ -1,4 +1,4 @@
-"""Every reader takes every writer's file, as docs/reference/readers.csv says; the files are made by the real tools."""
+"""Every reader takes every writer's file, as docs/readers.csv says; the files are made by the real tools."""
 import csv
 import datetime
 import gzip
@@ -32,7 +32,7 @@ RUN = ('--fast', '--no-lcm', '--set', 'control.rate_Hz=100', '--set', 'experimen
 
 def table():
     """{(writer, reader): cell} of the page."""
-    with open(ROOT / 'docs' / 'reference' / 'readers.csv', newline='') as file:
+    with open(ROOT / 'docs' / 'readers.csv', newline='') as file:
         return {(row['file'], reader): cell for row in csv.DictReader(file) for reader, cell in row.items() if reader != 'file'}
 
 

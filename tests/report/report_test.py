@@ -409,8 +409,8 @@ class Files(ReportTest):
                            ((), 'RUN'), ((a, '--window', '3:2'), '--window 3:2'), ((a, '--format', 'gif'), '--format'),
                            ((a, '--label', 'x', '--label', 'y'), '2 labels for 1 runs'),
                            ((a, '--columns', 'slip'), '--columns'), ((a, '--csv', '--columns', ','), '--columns names none'),
-                           ((a, '--output', 's.html', '--merits', './s.html', '--force'), 'one file for --out and --merits'),
-                           ((a, '--merits', 'report.html', '--force'), 'one file for'),
+                           ((a, '--output', 's.csv', '--merits', './s.csv', '--force'), 'give FILE.html'),
+                           ((a, '--merits', 'report.html', '--force'), 'give FILE.csv'),
                            ((a, '--window', '-1:-2'), '--window -1:-2')):
             self.assertIn(says, self.report(*args, status=2).stderr.decode())
         self.assertEqual(list(self.folder.glob('*.html')), [])

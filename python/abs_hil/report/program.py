@@ -153,8 +153,6 @@ def _report(o: argparse.Namespace) -> None:
         _check_replaceable(path, o.force)
     if o.merits:
         refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
-        if not o.table and path.resolve() == pathlib.Path(o.merits).resolve():
-            raise ValueError(f'"{path}" is one file for --out and --merits; give two')
     with progress_shown(sys.stderr.isatty()) as progress:
         runs, surveys, figures, parts = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
