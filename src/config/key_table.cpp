@@ -92,6 +92,7 @@ void set_values(const nlohmann::ordered_json& node, const std::string& name, Key
 }  // namespace
 
 KeyTable::KeyTable(Settings& settings) {
+  keys_.reserve(512);  // about as many as there are; growing would touch twice the memory
   rig::for_each_option(settings, {}, [this](const std::string& name, const rig::OptionFacts& facts, auto& value) {
     keys_.push_back({facts, name, &value});
   });

@@ -26,11 +26,14 @@ constexpr std::int64_t poll_interval_ns = 2'000'000;
 /// messages of a channel and drop the rest.
 constexpr std::size_t records_per_burst = 16;
 constexpr std::int64_t burst_interval_ns = 500'000;
-/// Records the ring holds: 0.8 s at 10 kHz, long enough for a slow disk.
-constexpr std::size_t ring_capacity = 8192;
-/// The ring of a stepped run is emptied after every cycle, and clearing a large one would cost more than the run.
-constexpr std::size_t stepped_ring_capacity = 2;
 constexpr int fast_cycles_per_drain = 1000;
+
+/// Records the ring holds. Clearing a large one costs more than a run that steps or does not wait.
+std::size_t ring_capacity(const Given& given) noexcept {
+  if (given.stepped) return 2;                            // it is emptied after every cycle
+  return given.real_time ? 8192 : fast_cycles_per_drain;  // 0.8 s at 10 kHz, long enough for a slow disk
+}
+
 /// A controller whose steps take long must not keep Ctrl-C waiting.
 constexpr std::int64_t fast_drain_max_ns = 100'000'000;
 constexpr int fast_cycles_per_look = 8;
@@ -190,7 +193,7 @@ Run::Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts
       logic_(std::move(parts)),
       outer_logic_(given.logic ? given.logic(logic_) : nullptr),
       gate_(logic_.make_gate(settings().gate, given.checks_wheels)),
-      ring_(given.stepped ? stepped_ring_capacity : ring_capacity),
+      ring_(ring_capacity(given)),
       executive_(clock_, driver_, outer_logic_ ? *outer_logic_ : logic_, gate_, ring_, prepared.period_ns,
                  given.overruns.value_or(settings().realtime.overruns), !given.stepped),
       metrics_(plant_of(prepared, given).rig.wheels.r2_m, settings().experiment.end_speed_m_s),
