@@ -169,9 +169,9 @@ def benchmark() -> argparse.ArgumentParser:
 def convert() -> argparse.ArgumentParser:
     made = _parser('abs_convert', 'Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and others '
                    '(docs/interchange.md)')
-    made.add_argument('input', nargs='?', metavar='IN', help='run folder, event log (.lcmlog), CSV, MCAP or Parquet; IN#2: the '
-                      'second run of a file')
-    made.add_argument('output', metavar='OUT', help='file to write: .csv, .mcap or .parquet')
+    made.add_argument('files', nargs='*', metavar='FILE', help='IN: run folder, event log (.lcmlog), CSV, MCAP or Parquet; IN#2: '
+                      'the second run of a file; then OUT, the file to write')
+    made.add_argument('--out', metavar='OUT', help='file to write: .csv, .mcap or .parquet; the last FILE otherwise')
     made.add_argument('--live', metavar='URL', help='record a running experiment from this LCM network; "" is the default one')
     made.add_argument('--prefix', default='ABS_', help='its telemetry.channel_prefix (default: %(default)s)')
     made.add_argument('--idle', type=float, metavar='S', help='with --live: end S seconds after the last message')

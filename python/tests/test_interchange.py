@@ -250,7 +250,7 @@ def test_killed_conversion_leaves_no_file(folder, tmp_path):
 
 
 @pytest.mark.parametrize('arguments, words', [
-    (['nowhere', 'out.mcap'], 'nowhere'), (['{run}', 'out.txt'], '.mcap or .parquet'), (['out.mcap'], 'either IN or --live'),
+    (['nowhere', 'out.mcap'], 'nowhere'), (['{run}', 'out.txt'], '.mcap or .parquet'), (['out.mcap'], 'one IN, or --live'),
     (['--live', 'udpm://239.255.76.67:7667?ttl=0', 'out.parquet'], '--live writes .mcap only'),
     (['--seconds', '3', '{run}', 'out.mcap'], 'belong to --live'), (['{run}', 'nowhere/out.mcap'], 'nowhere/out.mcap'),
     (['--live', 'nonsense', 'out.mcap'], 'nonsense')])

@@ -16,19 +16,20 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 def main(arguments: list[str]) -> int:
     given = parsers.convert().parse_args(arguments)
-    output = pathlib.Path(given.output)
+    *inputs, out = [*given.files, *filter(None, [given.out])] or ['']
+    output = pathlib.Path(out)
     try:
         if output.suffix not in TARGETS:
-            raise ValueError(f'OUT = {given.output}: give a name that ends in .csv, .mcap or .parquet')
-        if (given.input is None) == (given.live is None):
-            raise ValueError('give either IN or --live URL')
+            raise ValueError(f'OUT = {out or "nothing"}: give a name that ends in .csv, .mcap or .parquet')
+        if len(inputs) != (given.live is None):
+            raise ValueError('give one IN, or --live URL in its place')
         if not output.parent.is_dir():
-            raise ValueError(f'OUT = {given.output}: there is no folder {output.parent}; create it first')
+            raise ValueError(f'OUT = {output}: there is no folder {output.parent}; create it first')
         if given.live is None and (given.idle is not None or given.seconds is not None):
             raise ValueError('--idle and --seconds belong to --live')
         if given.live is not None and output.suffix != '.mcap':
             raise ValueError('--live writes .mcap only; convert that run\'s folder or log to .parquet afterwards')
-        print(_record(given, output) if given.live is not None else _convert(given.input, output))
+        print(_record(given, output) if given.live is not None else _convert(inputs[0], output))
         return 0
     except (ValueError, OSError) as error:
         full = isinstance(error.__context__, OSError) and error.__context__.errno in FULL
