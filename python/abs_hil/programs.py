@@ -66,6 +66,10 @@ def start(name: str, arguments: list[str]) -> int:
     status = _start(name, arguments)
     with contextlib.suppress(OSError):
         sys.stdout.flush()
+    try:
+        sys.stderr.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     if raw.problem is None:
         return status
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python tries once more at its end

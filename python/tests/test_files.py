@@ -115,10 +115,12 @@ def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
         made.unlink(missing_ok=True)
 
 
-def test_the_status_is_told_although_nobody_reads_why(tmp_path):
+@pytest.mark.parametrize('unbuffered', ['', '1'])  # '' is as if it were not set
+def test_the_status_is_told_although_nobody_reads_why(tmp_path, unbuffered):
     nobody, out = os.pipe()
     os.close(nobody)
-    result = subprocess.run(command('report', tmp_path / 'nowhere'), stdout=out, stderr=out)
+    result = subprocess.run(command('report', tmp_path / 'nowhere'), stdout=out, stderr=out,
+                            env=os.environ | {'PYTHONUNBUFFERED': unbuffered})
     os.close(out)
     assert result.returncode == 2
 
