@@ -1,14 +1,24 @@
-"""Files that are either complete or absent."""
+"""Files that are either complete or absent; and JSON and TOML from outside, without values that nest so deep that walking through
+them exhausts the stack."""
 import errno
+import json
 import os
 import pathlib
+import re
 import tempfile
+import tomllib
 from collections.abc import Callable
+from typing import Any
 
 from .core import _core
 
 #: bytes that a text may have
 _TEXT_MAX = 1 << 26
+#: as in src/rig/nesting.hpp
+MOST_LEVELS = 64
+# tomllib takes time with the square of a name's parts. Names lie between characters that no name has.
+_MOST_PARTS = 100
+_OUTSIDE_NAMES = re.compile(r'''[^\w"'. \t-]+''')
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *, probe: bool = False) -> None:
@@ -39,13 +49,13 @@ def refusal(error: OSError, place: object = None, deed: str = 'write') -> str:
     return _core.refusal(error.errno, str(error.filename or '' if place is None else place), deed)
 
 
-def read_text(path: pathlib.Path) -> str:
+def read_text(path: pathlib.Path, errors: str = 'strict') -> str:
     """The text of a file. Raises OSError, also for one that no program here writes: a device may have no end."""
     with open(path, 'rb') as file:
         content = file.read(_TEXT_MAX + 1)
     if len(content) > _TEXT_MAX:
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-    return content.decode('utf-8-sig')
+    return content.decode('utf-8-sig', errors)
 
 
 def make_folder(folder: pathlib.Path, option: str) -> None:
@@ -65,3 +75,30 @@ def refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """write_whole for a text."""
     write_whole(path, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
+
+
+def _checked(parse: Callable[[Any], Any], text: Any) -> Any:
+    too_deep = ValueError(f'nested deeper than {MOST_LEVELS} levels')
+    try:
+        value = parse(text)
+    except RecursionError:
+        raise too_deep from None
+    level = [value]
+    for _ in range(MOST_LEVELS):
+        level = [item for node in level if isinstance(node, (dict, list))
+                 for item in (node.values() if isinstance(node, dict) else node)]
+    if any(isinstance(item, (dict, list)) for item in level):
+        raise too_deep
+    return value
+
+
+def parse_json(text: str | bytes) -> Any:
+    """As json.loads. Raises ValueError also for what nests deeper than MOST_LEVELS."""
+    return _checked(json.loads, text)
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """As tomllib.loads. Raises ValueError also for what nests deeper than MOST_LEVELS."""
+    if any(name.count('.') >= _MOST_PARTS for name in _OUTSIDE_NAMES.split(text)):
+        raise ValueError(f'a name has more than {_MOST_PARTS} parts')
+    return _checked(tomllib.loads, text)

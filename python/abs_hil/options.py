@@ -1,4 +1,5 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
+import argparse
 import contextlib
 import functools
 import operator
@@ -6,7 +7,7 @@ import os
 import pathlib
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Union
 
 from .core import _core, load_network
@@ -42,6 +43,22 @@ def failed(name: str, error: object, status: int = 2) -> int:
     return status
 
 
+def as_main(parser: Callable[[], argparse.ArgumentParser], os_error: int = 2,
+            ) -> Callable[[Callable[[argparse.Namespace], int | None]], Callable[[Sequence[str] | None], int]]:
+    """Makes the main(arguments) of a program of what it does with its options. That may raise ValueError, which is status 2, and
+    OSError, whose status is `os_error`; without a status of its own a program ends with 0."""
+    def decorated(work: Callable[[argparse.Namespace], int | None]) -> Callable[[Sequence[str] | None], int]:
+        @functools.wraps(work)
+        def main(arguments: Sequence[str] | None = None) -> int:
+            made = parser()
+            try:
+                return work(made.parse_args(arguments)) or 0
+            except (ValueError, OSError) as error:
+                return failed(made.prog, error, os_error if isinstance(error, OSError) else 2)
+        return main
+    return decorated
+
+
 @functools.cache
 def _take_controller_files() -> None:
     """Lets controllers come from files: their code runs in a process that lies beside the program."""
@@ -59,6 +76,14 @@ def text_of(value: Value) -> str:
     if isinstance(value, float):
         return repr(value)
     raise ValueError(f'{value!r} is no configuration value; give a number, True, False or a text')
+
+
+def settings_of(texts: Sequence[str], form: str = 'KEY=VALUE') -> dict[str, Value]:
+    """The values by key of the words of --set. Raises ValueError for one that has not this form."""
+    for text in texts:
+        if '=' not in text:
+            raise ValueError(f'--set "{text}": give {form}')
+    return {key: value for key, _, value in (text.partition('=') for text in texts)}
 
 
 def _assignments(values: Any) -> list[str]:

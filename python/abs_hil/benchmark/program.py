@@ -8,9 +8,8 @@ from typing import Any
 
 from .. import parsers
 from ..core import _core
-from ..files import read_text, write_text, write_whole
-from ..nesting import parse_json
-from ..options import Value, failed
+from ..files import parse_json, read_text, write_text, write_whole
+from ..options import failed, settings_of
 from ..report.page import plotly_js
 from ..simulation import controllers
 from . import bounds, cases
@@ -21,16 +20,6 @@ from .score import Entry, keeps, run
 SHOWN = 20
 #: what a figure may differ by, relative: another compiler may round differently
 TOLERANCE = 1e-6
-
-
-def _settings(texts: Sequence[str]) -> dict[str, Value]:
-    values: dict[str, Value] = {}
-    for given in texts:
-        key, equals, value = given.partition('=')
-        if not equals:
-            raise ValueError(f'--set "{given}": give control.KEY=VALUE')
-        values[key] = value
-    return values
 
 
 def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict[str, float]]]:
@@ -117,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             summary = f'{len(found)} differences from fresh runs' if found else f'{given.verify}: fresh runs give the same'
             print(*found[:SHOWN], summary, sep='\n')
             return int(bool(found))
-        settings = _settings(given.set)
+        settings = settings_of(given.set, 'control.KEY=VALUE')
         for target in (given.json, given.page):
             if target is not None:
                 write_whole(target, lambda name: None, probe=True)
@@ -152,7 +141,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, RuntimeError, OSError) as error:
         return failed('abs_hil benchmark', error)
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

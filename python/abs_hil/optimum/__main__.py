@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 
-from ..options import failed
+from ..options import failed, settings_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,13 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ImportError as error:
         return failed('abs_hil.optimum', error, 3)
     try:
-        values = {}
-        for text in given.set:
-            key, equals, value = text.partition('=')
-            if not equals:
-                raise ValueError(f'--set "{text}": give KEY=VALUE')
-            values[key] = value
-        found = {}
+        values, found = settings_of(given.set), {}
         for name, knows_road in (('causal', False), ('preview', True)):
             braking = optimum(given.plant, values, start_speed_rad_s=given.start_speed, end_speed_m_s=given.end_speed,
                               knows_road=knows_road)

@@ -3,6 +3,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,33 +24,28 @@ FOLLOW_PER_S = 30.0
 LEAD_PER_S = 60.0
 
 
-class _Integrator:
-    """States under commands that are given, by Runge-Kutta steps far below every time constant."""
+def _after(rig: Rig, rates: Mapping[bool, Any], x: np.ndarray, time_s: float, plan: Trajectory, k: int, piece: Piece,
+           duration_s: float) -> np.ndarray:
+    """The state after a part of interval k of a plan: under its command, or with a limit under its torque's rate. By Runge-Kutta
+    steps far below every time constant."""
+    def slope(x: np.ndarray, friction: float) -> np.ndarray:
+        rate = control if rig.limited else rig['c31_per_s'] * (control - x[TORQUE])
+        stands = bool(x[SLIP] >= 1.0 and x[TORQUE] >= rig.holds_Nm(friction))
+        return np.asarray(rates[stands](x, rate, friction).full().ravel())
 
-    def __init__(self, rig: Rig) -> None:
-        self._rig = rig
-        self._turning, self._standing = rig.rates_function(False), rig.rates_function(True)
-
-    def _slope(self, x: np.ndarray, control: float, friction: float) -> np.ndarray:
-        rate = control if self._rig.limited else self._rig['c31_per_s'] * (control - x[TORQUE])
-        stands = x[SLIP] >= 1.0 and x[TORQUE] >= self._rig.holds_Nm(friction)
-        return (self._standing if stands else self._turning)(x, rate, friction).full().ravel()
-
-    def after(self, x: np.ndarray, time_s: float, plan: Trajectory, k: int, piece: Piece, duration_s: float) -> np.ndarray:
-        """The state after a part of interval k of a plan: under its command, or with a limit under its torque's rate."""
-        change_Nm = float(plan.states[k + 1, TORQUE] - plan.states[k, TORQUE])
-        control = change_Nm / float(plan.time_s[k + 1] - plan.time_s[k]) if self._rig.limited else float(plan.command_Nm[k])
-        steps = max(1, math.ceil(duration_s / STEP_S))
-        h = duration_s / steps
-        for number in range(steps):
-            friction = float(piece.friction(time_s + (number + 0.5) * h, x[DISTANCE] + 0.5 * h * self._rig['r2_m'] * x[OMEGA2]))
-            k1 = self._slope(x, control, friction)
-            k2 = self._slope(x + 0.5 * h * k1, control, friction)
-            k3 = self._slope(x + 0.5 * h * k2, control, friction)
-            k4 = self._slope(x + h * k3, control, friction)
-            x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-            x[SLIP] = min(x[SLIP], 1.0)
-        return x
+    change_Nm = float(plan.states[k + 1, TORQUE] - plan.states[k, TORQUE])
+    control = change_Nm / float(plan.time_s[k + 1] - plan.time_s[k]) if rig.limited else float(plan.command_Nm[k])
+    steps = max(1, math.ceil(duration_s / STEP_S))
+    h = duration_s / steps
+    for number in range(steps):
+        friction = float(piece.friction(time_s + (number + 0.5) * h, x[DISTANCE] + 0.5 * h * rig['r2_m'] * x[OMEGA2]))
+        k1 = slope(x, friction)
+        k2 = slope(x + 0.5 * h * k1, friction)
+        k3 = slope(x + 0.5 * h * k2, friction)
+        k4 = slope(x + h * k3, friction)
+        x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        x[SLIP] = min(x[SLIP], 1.0)
+    return x
 
 
 def _cut(rig: Rig, plan: Trajectory, piece: Piece, until_s: float) -> tuple[Trajectory, bool]:
@@ -58,12 +54,12 @@ def _cut(rig: Rig, plan: Trajectory, piece: Piece, until_s: float) -> tuple[Traj
     The plan knows the friction at its start only. So where the friction changes along the piece, its commands are
     integrated on the true road.
     """
-    integrator = _Integrator(rig)
+    rates = {stands: rig.rates_function(stands) for stands in (False, True)}
     times, states = [plan.time_s[0]], [plan.states[0]]
     count = len(plan.command_Nm)
     for k in range(count):
         x, now_s, length_s = states[-1], times[-1], plan.time_s[k + 1] - plan.time_s[k]
-        end = plan.states[k + 1] if piece.slope == 0.0 else integrator.after(x, now_s, plan, k, piece, length_s)
+        end = plan.states[k + 1] if piece.slope == 0.0 else _after(rig, rates, x, now_s, plan, k, piece, length_s)
         over_s = now_s + length_s - min(until_s, piece.end if piece.along == 'time' else math.inf)
         part = 1.0 - over_s / length_s if over_s > 0.0 else 1.0
         if piece.along == 'distance' and end[DISTANCE] > piece.end:
@@ -74,7 +70,7 @@ def _cut(rig: Rig, plan: Trajectory, piece: Piece, until_s: float) -> tuple[Traj
             reached_s = 2.0 * gap_m / (v0 + math.sqrt(max(v0 * v0 - 2.0 * slowing * gap_m, 0.0)))
             part = min(part, reached_s / length_s)
         if part < 1.0:
-            states.append(integrator.after(x, now_s, plan, k, piece, part * length_s))
+            states.append(_after(rig, rates, x, now_s, plan, k, piece, part * length_s))
             times.append(now_s + part * length_s)
             return Trajectory(np.array(times), np.array(states), plan.command_Nm[:k + 1]), False
         states.append(end)

@@ -55,9 +55,7 @@ class Phase:
 
     def state_at(self, time_s: float) -> np.ndarray:
         times, states = self._rows
-        after = min(max(int(np.searchsorted(times, time_s)), 1), len(times) - 1)
-        share = min(max((time_s - times[after - 1]) / (times[after] - times[after - 1]), 0.0), 1.0)
-        return np.asarray((1.0 - share) * states[after - 1] + share * states[after])
+        return np.array([np.interp(time_s, times, column) for column in states.T])
 
     def command_at(self, time_s: float) -> float:
         after = int(np.searchsorted(self._rows[0], time_s))

@@ -70,18 +70,9 @@ def _mesh(duration_s: float) -> np.ndarray:
     return lengths / lengths.sum()
 
 
-def _collocation() -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the Lagrange polynomials at the points, shape (DEGREE, DEGREE + 1), and the points in [0, 1]."""
-    points = np.append(0.0, ca.collocation_points(DEGREE, 'radau'))
-    slopes = np.zeros((DEGREE, DEGREE + 1))
-    for j in range(DEGREE + 1):
-        others = [points[r] for r in range(DEGREE + 1) if r != j]
-        basis = np.poly1d(np.poly(others) / np.prod([points[j] - other for other in others]))
-        slopes[:, j] = np.polyder(basis)(points[1:])
-    return slopes, points
-
-
-SLOPES, POINTS = _collocation()
+#: in [0, 1], and the derivatives of the Lagrange polynomials there, shape (DEGREE, DEGREE + 1)
+POINTS = np.append(0.0, ca.collocation_points(DEGREE, 'radau'))
+SLOPES = ca.collocation_coeff(list(POINTS[1:]))[0].full().T
 #: sizes of the state's elements, for the solver
 SCALE = np.array([0.1, 100.0, 5.0, 10.0])
 _SCALE = ca.DM(SCALE)
@@ -140,9 +131,7 @@ def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase],
         return symbols[-1]
 
     slowest = 0.5 * end_speed_m_s / rig['r2_m']
-    fastest = 2.0 * float(start[OMEGA2])
-    ranges = {False: (np.array([-0.5, slowest, 0.0, 0.0]) / SCALE, np.array([1.0, fastest, rig.max_torque_Nm, 1e3]) / SCALE),
-              True: (np.array([1.0, slowest, 0.0, 0.0]) / SCALE, np.array([1.0, fastest, rig.max_torque_Nm, 1e3]) / SCALE)}
+    ceiling = np.array([1.0, 2.0 * float(start[OMEGA2]), rig.max_torque_Nm, 1e3]) / SCALE
     x, time = ca.SX(np.array(start, dtype=float) / SCALE), ca.SX(start_s)
     times, states = [time], [x]
     commands: list[ca.SX] = []
@@ -155,7 +144,7 @@ def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase],
             lasting.append(duration)
         else:
             duration = variable(np.array([expected_s]), np.array([SHORTEST_S]), np.array([10.0 * expected_s + 0.1]))
-        floor, ceiling = ranges[phase.stands]
+        floor = np.array([1.0 if phase.stands else -0.5, slowest, 0.0, 0.0]) / SCALE
         for share in _mesh(expected_s):
             h, step_s = float(share) * duration, float(share) * expected_s
             command_Nm = phase.command_at(guess_s + 0.5 * step_s)
