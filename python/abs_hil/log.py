@@ -12,7 +12,7 @@ import numpy as np
 
 from . import parsers
 from .core import _core
-from .interchange.mcap_file import McapContent
+from .interchange.messages import McapContent
 from .interchange.recorded import missing_rows
 from .messages import TYPES
 from .options import failed

@@ -1,8 +1,10 @@
-"""The figures of merit of a braking run: the program's own table (src/analysis/braking_figures.hpp)."""
+"""The figures of merit of a braking run, the program's own table (src/analysis/braking_figures.hpp), and their means over runs
+with 95 % confidence intervals by Student's t."""
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,3 +78,47 @@ def heading_of(name: str) -> str:
         return figures()[name].heading
     ending = next(ending for ending in _UNITS if name.endswith(ending))
     return with_unit(name.removesuffix(ending).replace('_', ' '), _UNITS[ending])
+
+
+class Estimate(NamedTuple):
+    """Of a mean. NaN if the sample is too small: the mean needs one value, everything else two.
+
+    n: number of values; deviation: standard deviation of the sample, with n - 1; low, high: the interval,
+    mean -+ t(0.975, n - 1) deviation / sqrt(n).
+    """
+    n: int
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        return 0.5 * (self.high - self.low)
+
+
+def of_mean(values: np.ndarray | list[float]) -> Estimate:
+    """The mean of the values that are not NaN. They add up in their order, so that the bits depend on nothing else."""
+    array = np.asarray(values, dtype=float)
+    known = array[~np.isnan(array)]
+    n = len(known)
+    mean = float(np.cumsum(known)[-1] / n) if n else np.nan
+    if n < 2:
+        return Estimate(n, mean, np.nan, np.nan, np.nan)
+    deviation = float(np.sqrt(np.cumsum((known - mean) ** 2)[-1] / (n - 1)))
+    half = _core.student_quantile(0.975, n - 1) * deviation / float(np.sqrt(n))
+    return Estimate(n, mean, deviation, mean - half, mean + half)
+
+
+def of_difference(values: np.ndarray, base: np.ndarray) -> Estimate:
+    """The mean of `values - base` over the pairs without NaN. What both share cancels, so that small differences show."""
+    return of_mean(values - base)
+
+
+def of_ratio(values: np.ndarray, base: np.ndarray) -> Estimate:
+    """The geometric mean of `values / base` over the pairs in which both are > 0. The interval is that of the logarithms, so
+    that the inverse ratio has the inverse interval; the deviation is that of the logarithms."""
+    # NumPy's logarithm differs from processor to processor.
+    logarithms = of_mean([math.log(value / one) for value, one in zip(values, base) if value > 0.0 and one > 0.0])
+    mean, low, high = (math.exp(value) for value in (logarithms.mean, logarithms.low, logarithms.high))
+    return logarithms._replace(mean=mean, low=low, high=high)

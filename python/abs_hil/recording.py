@@ -2,8 +2,7 @@
 
 A file may hold several runs: FILE#2 names the second one.
 """
-from __future__ import annotations
-
+import contextlib
 import gzip
 import math
 import os
@@ -14,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from .core import _core
-from .interchange.mcap_file import EVENT_TOPIC, McapContent
-from .interchange.messages import log_of
+from .files import parse_json
+from .interchange.messages import EVENT_TOPIC, McapContent, log_of
 from .merits import figures, figures_of
 from .messages import PHASES, REASONS, decode
-from .nesting import parse_json
 from .options import PathLike
-from .rows import CONTRACT, TEXTS, Rows, check_times, in_order, read_rows, starts_of
+from .rows import CONTRACT, TEXTS, check_times, in_order, read_rows, starts_of
 from .run import Event, Run, Series, name_phases, read_object, signals_of
 
 FOLDER, LOG, CSV, MCAP, PARQUET = 'run folder', 'LCM event log', 'CSV file', 'MCAP file', 'Parquet file'
@@ -39,11 +37,6 @@ def named(path: PathLike) -> tuple[pathlib.Path, int]:
     """The file, and the number of the run in it that a name like FILE#2 asks for; 0: the only one."""
     place, number = _core.named_recording(os.fsencode(path))
     return pathlib.Path(os.fsdecode(place)), number
-
-
-def _choose(path: PathLike, runs: int) -> int:
-    """Which of so many runs the name asks for, from 0. Raises ValueError, with what to give, if it must say it."""
-    return int(_core.chosen_run(os.fsencode(path), runs))
 
 
 def kind_of(place: pathlib.Path) -> str:
@@ -67,20 +60,12 @@ def kind_of(place: pathlib.Path) -> str:
                 return what
             raise ValueError(f'"{place}" is {what}')
     if head[:2] == b'\x1f\x8b':
-        with open(place, 'rb') as packed:
-            head = _first_bytes(packed)
-        if head.startswith(tuple(_BEGINNINGS)):
-            raise ValueError(f'"{place}" is compressed: decompress it first (gunzip)')
+        with contextlib.suppress(OSError, EOFError), gzip.open(place) as packed:
+            if packed.read(8).startswith(tuple(_BEGINNINGS)):
+                raise ValueError(f'"{place}" is compressed: decompress it first (gunzip)')
     elif place.suffix in ('.lcmlog', '.mcap', '.parquet') or (b'\0' in head and head[:2] not in (b'\xff\xfe', b'\xfe\xff')):
         raise ValueError(f'"{place}" is no recording, although its name may say so; give {WHAT}')
     return CSV
-
-
-def _first_bytes(packed: Any) -> bytes:
-    try:
-        return gzip.GzipFile(fileobj=packed).read(8)
-    except (OSError, EOFError):
-        return b''
 
 
 def load(path: PathLike) -> Run:
@@ -97,7 +82,7 @@ def load(path: PathLike) -> Run:
         run = {LOG: _load_log, CSV: _load_csv, MCAP: _load_mcap, PARQUET: _load_parquet}[kind](place, os.fspath(path))
         run.folder, run.name = place.parent, f'{place.stem}#{number}' if number else place.stem
         return run
-    _choose(path, 1)
+    _core.chosen_run(os.fsencode(path), 1)
     _core.check_seal(os.fsencode(place))
     rows = next((place / one for one in ('run.csv', 'run.lcmlog') if (place / one).exists()), None)
     if rows is None:
@@ -115,12 +100,6 @@ def load(path: PathLike) -> Run:
     else:
         run.notes.append('no summary.json: names, figures and configuration are unknown')
     return run
-
-
-def rows_of(path: PathLike) -> Rows:
-    """The rows alone of what `load` takes."""
-    run = load(path)
-    return Rows(run.columns, run.truncated)
 
 
 def run_names(path: PathLike) -> list[str]:
@@ -190,16 +169,14 @@ def _load_csv(place: pathlib.Path, name: str) -> Run:
     rows = read_rows(place)
     notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if rows.truncated else []
     columns, _ = _one_run({one: values for one, values in rows.columns.items() if one not in FROM_LOG}, name)
-    run = Run(columns, {}, signals_of(columns), notes=notes + rows.notes)
-    run.truncated = rows.truncated
-    return run
+    return Run(columns, {}, signals_of(columns), notes + rows.notes, truncated=rows.truncated)
 
 
 def read_log(path: PathLike, whole: bool = False) -> dict[str, Any]:
     """_core.read_log of the run that the name asks for, with phases as names."""
     place, number = named(path)
     found: dict[str, Any] = _core.read_log(os.fsencode(place), max(number, 1) - 1, whole)
-    _choose(path, found['runs'])
+    _core.chosen_run(os.fsencode(path), found['runs'])
     name_phases(found['columns'])
     return found
 
@@ -318,7 +295,7 @@ def _one_run(columns: Mapping[str, np.ndarray], name: str) -> tuple[dict[str, np
     starts = [*starts_of(columns), len(columns['time_s'])]
     if starts[-1] == 0:
         raise ValueError(f'"{name}" holds no rows')
-    number = _choose(name, len(starts) - 1)
+    number = _core.chosen_run(os.fsencode(name), len(starts) - 1)
     first, last = starts[number:number + 2]
     chosen = {one: values[first:last] for one, values in columns.items() if one != 'run'}
     check_times(chosen['time_s'], lambda row: f'{name}: row {first + row + 1}')
@@ -327,10 +304,9 @@ def _one_run(columns: Mapping[str, np.ndarray], name: str) -> tuple[dict[str, np
 
 def _described(columns: dict[str, np.ndarray], metadata: Mapping[str, str], attachments: dict[str, bytes]) -> Run:
     """A run of a converted file, with what stands there beside its rows."""
-    run = Run(columns, {one: metadata[one] for one in ('experiment', 'controller', 'plant', 'backend', 'result', 'reason')
-                        if one in metadata}, signals_of(columns))
-    run.attachments = attachments
-    run.losses = [one for one in metadata.get('losses', 'none').split('; ') if one != 'none']
+    facts = ('experiment', 'controller', 'plant', 'backend', 'result', 'reason')
+    run = Run(columns, {one: metadata[one] for one in facts if one in metadata}, signals_of(columns), attachments=attachments,
+              losses=[one for one in metadata.get('losses', 'none').split('; ') if one != 'none'])
     try:
         if 'config.json' in attachments:
             run.summary['config'] = parse_json(attachments['config.json'])

@@ -36,14 +36,6 @@ class Rows:
     truncated: bool
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def time_s(self) -> np.ndarray:
-        return self.columns['time_s']
-
-    @property
-    def braking(self) -> np.ndarray:
-        return self.columns['phase'] == 'brake'
-
 
 @dataclass
 class _Text:
@@ -180,12 +172,10 @@ def _header(place: pathlib.Path, text: _Text, needed: Sequence[str]) -> tuple[li
     first = text.data.find(b'\n') + 1
     names = [_core.clean_text(name.strip()) for name in text.data[:first].rstrip(b'\r\n').split(text.separator.encode())]
     missing = [name for name in needed if name not in names]
-    if missing and len(missing) == len(needed):
-        raise ValueError(f'{place}:1: the first line names no column of a run; a run\'s CSV, as abs_hil --csv writes it, begins '
-                         f'with "{",".join(CONTRACT[:3])},…"')
     if missing:
-        raise ValueError(f'{place}:1: the header lacks {", ".join(missing)}; a run\'s CSV, as abs_hil --csv writes it, '
-                         f'begins with "{",".join(CONTRACT[:3])},…"')
+        some = len(missing) < len(needed)
+        wrong = f'the header lacks {", ".join(missing)}' if some else 'the first line names no column of a run'
+        raise ValueError(f'{place}:1: {wrong}; a run\'s CSV, as abs_hil --csv writes it, begins with "{",".join(CONTRACT[:3])},…"')
     if twice := [name for name in names if name and names.count(name) > 1]:
         raise ValueError(f'{place}:1: the header has the column {twice[0]} twice')
     return names, first

@@ -3,15 +3,15 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import files
 from .core import _core
-from .files import write_whole
+from .files import parse_json, write_whole
 from .messages import PHASES, QUANTITIES
-from .nesting import parse_json
 from .options import PathLike
 from .rows import TEXTS
 
@@ -23,8 +23,6 @@ COLUMNS = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is
 
 #: quantities that are whole numbers
 _WHOLE = frozenset(name for name, row in QUANTITIES.items() if row['type'] in ('integer', 'boolean'))
-#: side files are small; a larger file is not one, and must not fill the memory
-MOST_BYTES = 64 << 20
 
 
 @dataclass
@@ -48,6 +46,7 @@ class Event:
         return self.message or f'{self.name or self.phase}: {self.reason}'
 
 
+@dataclass(eq=False, repr=False)
 class Run:
     """One run.
 
@@ -64,21 +63,18 @@ class Run:
     truncated: the last row of its CSV was incomplete.
     """
 
-    def __init__(self, columns: Mapping[str, np.ndarray], summary: Mapping[str, Any] | None = None,
-                 signals: tuple[str, ...] = (), *, notes: list[str] | None = None, config_toml: str = '',
-                 folder: pathlib.Path | None = None, name: str = '') -> None:
-        self.columns = dict(columns)
-        self.summary = dict(summary or {})
-        self.signals = tuple(signals)
-        self.notes = list(notes or [])
-        self.config_toml = config_toml
-        self.folder = folder
-        self.name = name
-        self.events: list[Event] = []
-        self.start_ns = 0
-        self.losses: list[str] = []
-        self.attachments: dict[str, bytes] = {}
-        self.truncated = False
+    columns: dict[str, np.ndarray]
+    summary: dict[str, Any] = field(default_factory=dict)
+    signals: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
+    config_toml: str = ''
+    folder: pathlib.Path | None = None
+    name: str = ''
+    events: list[Event] = field(default_factory=list)
+    start_ns: int = 0
+    losses: list[str] = field(default_factory=list)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    truncated: bool = False
 
     @property
     def data(self) -> pandas.DataFrame:
@@ -123,13 +119,12 @@ class Run:
         return f'<abs_hil.Run {self.name or controller}: {result}, {len(self)} cycles{stopped}>'
 
 
+@dataclass(eq=False, repr=False)
 class Series:
     """The runs of a series' folder: a sequence of Run, and `index`, the content of series.json."""
-
-    def __init__(self, runs: list[Run], index: Mapping[str, Any], notes: list[str]) -> None:
-        self.runs = runs
-        self.index = dict(index)
-        self.notes = notes
+    runs: list[Run]
+    index: dict[str, Any]
+    notes: list[str]
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -184,13 +179,13 @@ def name_phases(columns: dict[str, Any]) -> None:
         columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
 
 
-def names_apart(names: Iterable[str]) -> list[str]:
+def names_apart(names: Iterable[str], again: str = '{} ({})') -> list[str]:
     """Each name once: the second "run" is "run (2)"."""
     apart: list[str] = []
     for name in names:
         own, number = name, 2
         while own in apart:
-            own, number = f'{name} ({number})', number + 1
+            own, number = again.format(name, number), number + 1
         apart.append(own)
     return apart
 
@@ -214,9 +209,7 @@ def signals_of(columns: Iterable[str]) -> tuple[str, ...]:
 def read_text(path: pathlib.Path) -> str:
     """A small file beside the rows. Raises ValueError with file and reason."""
     try:
-        if (size := path.stat().st_size) > MOST_BYTES:
-            raise ValueError(f'{path}: {size} bytes are too many for this kind of file')
-        return path.read_bytes().decode('utf-8-sig', 'replace')
+        return files.read_text(path, 'replace')
     except OSError as error:
         raise ValueError(f'cannot read "{path}": {error.strerror}') from None
 

@@ -1,5 +1,6 @@
 """abs_hil export-fmu: the simulated rig, or with --controller a slip controller, as an FMU for co-simulation
 (docs/interchange.md)."""
+import argparse
 import pathlib
 import zipfile
 from typing import Any
@@ -9,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from .. import parsers
 from ..core import _core
 from ..files import refuse_existing, write_whole
-from ..options import failed
+from ..options import as_main
 from ..places import place_of
 
 #: the libraries in an FMU: folder and file as this package has them, folder by FMI 2 and 3
@@ -134,17 +135,13 @@ def write(model: dict[str, Any], fmi: int, path: pathlib.Path) -> list[str]:
     return [folder for folder, _, _ in libraries]
 
 
-def main(arguments: list[str]) -> int:
-    o = parsers.export_fmu().parse_args(arguments)
-    try:
-        if o.fmi not in (2, 3):
-            raise ValueError(f'--fmi {o.fmi}: give 2 or 3')
-        refuse_existing(o.out, '--out', o.force)
-        given = {name: getattr(o, name) for name in ('config', 'plant', 'model', 'controller', 'set')}
-        model = _core.fmu_model({name: value for name, value in given.items() if value is not None})
-        platforms = write(model, o.fmi, o.out)
-    except (ValueError, OSError) as error:
-        return failed('abs_hil export-fmu', error)
+@as_main(parsers.export_fmu)
+def main(o: argparse.Namespace) -> None:
+    if o.fmi not in (2, 3):
+        raise ValueError(f'--fmi {o.fmi}: give 2 or 3')
+    refuse_existing(o.out, '--out', o.force)
+    given = {name: getattr(o, name) for name in ('config', 'plant', 'model', 'controller', 'set')}
+    model = _core.fmu_model({name: value for name, value in given.items() if value is not None})
+    platforms = write(model, o.fmi, o.out)
     print(f'{model["name"]}: FMI {o.fmi}.0 co-simulation, {len(model["variables"])} variables, step {model["step_s"]:g} s, for '
           f'{", ".join(platforms)}')
-    return 0

@@ -1,14 +1,20 @@
-"""ROS 2 messages of runs: their definitions, their bytes in CDR (little endian), and MCAP files of them.
+"""ROS 2 messages of runs: their definitions, their bytes in CDR (little endian), and MCAP files of them, to write and to read.
 
 All but the log's are flat structs of float64. Both PlotJuggler and Foxglove read these.
 """
+import pathlib
 import re
 import struct
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import IO, Any
 
 import numpy as np
 
+from ..messages import PHASES
+from ..run import names_apart
+
+CYCLE_TOPIC, SIGNALS_TOPIC, EVENT_TOPIC = '/abs_hil/cycle', '/abs_hil/signals', '/abs_hil/event'
 _LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
 #: rcl_interfaces/msg/Log, which Foxglove shows as a log
@@ -31,15 +37,9 @@ CHUNK_BYTES = 1 << 20
 
 def field_names(columns: Iterable[str]) -> dict[str, str]:
     """column -> name of its field. ROS 2 allows lower-case letters, digits and single '_' within a name only."""
-    taken: dict[str, str] = {}
-    for column in columns:
-        base = re.sub('_+', '_', column.lower()).strip('_')
-        name = base if base[:1].isalpha() else f'x_{base}'.rstrip('_')
-        number = 2
-        while name in taken.values():
-            name, number = f'{base}_{number}', number + 1
-        taken[column] = name
-    return taken
+    known = list(columns)
+    bases = [re.sub('_+', '_', column.lower()).strip('_') for column in known]
+    return dict(zip(known, names_apart((base if base[:1].isalpha() else f'x_{base}'.rstrip('_') for base in bases), '{}_{}')))
 
 
 def definition(fields: Iterable[tuple[str, str]]) -> str:
@@ -54,13 +54,7 @@ def columns_of(text: str) -> list[str]:
     return re.findall(r'^float64 \w+  # ([^:\n]*)', text, re.MULTILINE)
 
 
-def rows(columns: Sequence[np.ndarray]) -> list[bytes]:
-    """One message a row of the columns, all of shape (rows,)."""
-    table = np.column_stack([np.asarray(column, dtype='<f8') for column in columns])
-    return [_LITTLE_ENDIAN + row.tobytes() for row in table]
-
-
-def row(values: Sequence[float]) -> bytes:
+def row_bytes(values: Sequence[float]) -> bytes:
     return _LITTLE_ENDIAN + struct.pack(f'<{len(values)}d', *values)
 
 
@@ -134,8 +128,9 @@ class McapFile(Topics):
         self._sequence[topic] += 1
 
     def write_rows(self, topic: str, times_ns: np.ndarray, columns: Sequence[np.ndarray]) -> None:
-        for time_ns, data in zip(times_ns.tolist(), rows(columns)):
-            self.write(topic, time_ns, data)
+        """One message a row of the columns, all of shape (rows,)."""
+        for time_ns, values in zip(times_ns.tolist(), np.column_stack(columns).astype('<f8')):
+            self.write(topic, time_ns, _LITTLE_ENDIAN + values.tobytes())
 
     def attach(self, name: str, media_type: str, data: bytes, time_ns: int) -> None:
         self._writer.add_attachment(create_time=time_ns, log_time=time_ns, name=name, media_type=media_type, data=data)
@@ -145,3 +140,83 @@ class McapFile(Topics):
 
     def finish(self) -> None:
         self._writer.finish()
+
+
+@dataclass
+class Topic:
+    """type: its schema's name. times_ns: Unix times of its messages. bytes: of all of them. data: of ours, the messages."""
+    name: str
+    type: str
+    columns: list[str]
+    times_ns: list[int] = field(default_factory=list)
+    data: list[bytes] = field(default_factory=list)
+    bytes: int = 0
+
+
+class McapContent:
+    """topics: by number of the channel. damage: why the rest is not read; empty: nothing is missing. Raises ImportError without
+    the package mcap."""
+
+    def __init__(self, place: pathlib.Path) -> None:
+        from mcap.stream_reader import StreamReader
+        self.place, self.damage = place, ''
+        self.topics: dict[int, Topic] = {}
+        self.metadata: dict[str, str] = {}
+        self.attachments: dict[str, bytes] = {}
+        schemas: dict[int, Any] = {}
+        record: Any
+        with open(place, 'rb') as file:
+            try:
+                for record in StreamReader(file, validate_crcs=True).records:
+                    kind = type(record).__name__
+                    if kind == 'Schema':
+                        schemas[record.id] = record
+                    elif kind == 'Channel':
+                        schema = schemas.get(record.schema_id)
+                        rows = record.topic in (CYCLE_TOPIC, SIGNALS_TOPIC)
+                        self.topics.setdefault(record.id, Topic(record.topic, schema.name if schema else '',
+                                                                columns_of(schema.data.decode()) if rows and schema else []))
+                    elif kind == 'Message':
+                        self._take(self.topics[record.channel_id], record.log_time, record.data)
+                    elif kind == 'Attachment':
+                        self.attachments[record.name] = record.data
+                    elif kind == 'Metadata' and record.name == 'abs_hil':
+                        self.metadata = record.metadata
+            except Exception as error:  # the package lets out its own kinds, zstd's and struct's
+                self.damage = str(error) or type(error).__name__
+
+    def _take(self, topic: Topic, time_ns: int, data: bytes) -> None:
+        if topic.columns and len(data) != 4 + 8 * len(topic.columns):
+            raise ValueError(f'a message of {topic.name} has {len(data)} bytes')
+        topic.times_ns.append(time_ns)
+        topic.bytes += len(data)
+        if topic.columns or topic.name == EVENT_TOPIC:
+            topic.data.append(data)
+
+    def columns(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """The columns of the cycles, with phases as names and, if there are several runs, their numbers as `run`; and the rows'
+        Unix times. Raises ValueError for a file without cycles."""
+        tables = [(topic.name, *_table(topic)) for topic in self.topics.values() if topic.columns and topic.data]
+        found, times_ns = next((table[1:] for table in tables if table[0] == CYCLE_TOPIC), (None, np.empty(0)))
+        if found is None:
+            held = ', '.join(sorted({topic.name for topic in self.topics.values()})) or 'nothing'
+            raise ValueError(f'"{self.place}" holds no topic {CYCLE_TOPIC} with cycles of abs_hil, but {held}'
+                             + f'; it is cut off or damaged: {self.damage}' * bool(self.damage))
+        for _, signals, own_ns in (table for table in tables if table[0] == SIGNALS_TOPIC):
+            places = np.minimum(np.searchsorted(times_ns, own_ns), len(times_ns) - 1)
+            fits = times_ns[places] == own_ns
+            for name, values in signals.items():
+                found.setdefault(name, np.full(len(times_ns), np.nan))[places[fits]] = values[fits]
+        for column, texts in (('phase', [*PHASES]), ('phase_name', self.metadata.get('phase_names', '').split(','))):
+            if column in found:
+                numbers = np.nan_to_num(found[column], nan=-1.0)
+                known = (numbers >= 0) & (numbers < len(texts))
+                found[column] = np.array([*texts, ''], dtype=object)[np.where(known, numbers, -1).astype(int)]
+        if (back := np.diff(found['time_s'], prepend=-np.inf) < 0).any():
+            found['run'] = np.cumsum(back)
+        return found, times_ns
+
+
+def _table(topic: Topic) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    values = np.frombuffer(b''.join(data[4:] for data in topic.data), dtype='<f8').reshape(len(topic.data), -1)
+    return {name: values[:, n].astype(float) for n, name in enumerate(topic.columns)}, np.array(topic.times_ns)

@@ -38,13 +38,13 @@ def main(arguments: list[str]) -> int:
 
 def _convert(path: str, output: pathlib.Path) -> str:
     from . import recorded
-    from .to_csv import to_csv
+
     origin = named(path)[0].resolve()
     if output.resolve() == origin or origin.is_dir() and output.resolve().parent == origin:
         raise ValueError(f'OUT = {output}: this command reads it; give another file')
     read, more = recorded.read(path), ''
     if output.suffix == '.csv':
-        more = to_csv(read, path, output)
+        more = recorded.to_csv(read, path, output)
     else:
         write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
         write_whole(output, lambda name: write(read, name))

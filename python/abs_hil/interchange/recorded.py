@@ -1,17 +1,20 @@
 """Recorded runs: their rows with everything that stands beside them and what is missing, converted for other tools."""
 import datetime
 import json
+import os
 import pathlib
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from ..messages import PHASES, QUANTITIES
-from ..nesting import parse_json
-from ..recording import load, read_events
+from ..core import _core
+from ..files import parse_json, write_whole
+from ..messages import PHASES, QUANTITIES, decode
+from ..recording import FROM_LOG, LOG, kind_of, load, named, read_events, read_log
 from ..rows import check_times
 from ..run import COLUMNS, Run, csv_bytes
-from .mcap_file import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC
-from .messages import McapFile
+from .messages import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC, McapFile
 
 CYCLE_TYPE, SIGNALS_TYPE = 'abs_hil/msg/Cycle', 'abs_hil/msg/Signals'
 #: kinds of events and their levels in a log
@@ -19,6 +22,8 @@ LEVELS = {'phase': 20, 'command': 20, 'limit': 30, 'fault': 40}
 MEDIA_TYPES = {'.json': 'application/json', '.toml': 'application/toml', '.csv': 'text/csv'}
 #: ROS 2's stamps hold no later time
 LAST_NS = (2 ** 31 - 1) * 10 ** 9
+#: rows that are texts at once
+_ROWS = 50_000
 #: files of a run folder that go with its rows
 ATTACHED = ('config.toml', 'experiment.toml', 'summary.json', 'environment.json', 'events.csv')
 
@@ -127,3 +132,57 @@ def to_parquet(run: Run, name: str) -> None:
     metadata.update((f'abs_hil.{key}', data) for key, data in run.attachments.items())
     metadata['abs_hil.units'] = json.dumps({column: comment(column) for column in table.column_names}).encode()
     pyarrow.parquet.write_table(table.replace_schema_metadata(metadata), name, compression='zstd')
+
+
+def to_csv(run: Run, name: str, out: pathlib.Path) -> str:
+    """Writes all files, or none, and returns words about what is in them. Of an event log OUT.csv has the columns of --csv, then
+    every other quantity; OUT.CHANNEL.csv the fields of each other channel's messages; OUT.raw.csv, as hexadecimal digits, what
+    is none of our messages. The last columns say where in the log a row came from."""
+    log, number = named(name)
+    log = log / 'run.lcmlog' if (log / 'run.lcmlog').is_file() else log
+    if kind_of(log) != LOG:
+        _write([(out, run.columns)])
+        return ''
+    found = read_log(f'{log}#{number}' if number else log, whole=True)
+    columns, main = found['columns'], (found['channel'], 'telemetry_t')
+    columns.update(zip(FROM_LOG[2:], (np.full(found['rows'], text, dtype=object) for text in main)))
+    in_main = {*columns['log_event'].tolist()}
+    tables: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for of_run, _, event, time_us, channel, data in _core.LogEvents(os.fsencode(log)):
+        if of_run != max(number, 1) - 1 or (channel == main[0] and event in in_main):
+            continue
+        try:
+            message = decode(data)
+            key, row = (channel, type(message).__name__), {one: getattr(message, one) for one in message.__slots__}
+        except ValueError:
+            key, row = ('raw', 'raw'), {'data_hex': data.hex()}
+        tables.setdefault(key, []).append({**row, **dict(zip(FROM_LOG, (event, time_us, channel, key[1])))})
+    files = {out: columns}
+    for (channel, type_), rows in tables.items():
+        part = channel.replace('/', '_')
+        endings = [part, f'{part}.{type_}', *(f'{part}.{type_}.{n}' for n in range(2, len(tables) + 2))]
+        path = next(one for one in (out.with_name(f'{out.stem}.{ending}.csv') for ending in endings) if one not in files)
+        files[path] = {one: _column([row[one] for row in rows]) for one in rows[0]}
+    _write([*files.items()])
+    raw = len(tables.get(('raw', 'raw'), ()))
+    return (f', {sum(map(len, tables.values())) + found["rows"]} messages'
+            + f', {raw} of them not of abs_hil, as hexadecimal digits' * (raw > 0))
+
+
+def _column(values: Sequence[Any]) -> np.ndarray:
+    if isinstance(values[0], (int, float)):
+        return np.array(values, dtype=None if not isinstance(values[0], bool) else np.int64)
+    return np.array([one if isinstance(one, str) else ' '.join(map(repr, one)) for one in values], dtype=object)
+
+
+def _write(files: list[tuple[pathlib.Path, dict[str, np.ndarray]]]) -> None:
+    """Writes each before any is in its place. The first one, the main one, gets there last."""
+    (path, columns), *others = files
+
+    def write(name: str) -> None:
+        with open(name, 'wb') as file:
+            for begin in range(0, len(next(iter(columns.values()))), _ROWS):
+                file.write(csv_bytes({one: values[begin:begin + _ROWS] for one, values in columns.items()}, begin == 0))
+        if others:
+            _write(others)
+    write_whole(path, write)

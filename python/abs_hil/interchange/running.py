@@ -1,4 +1,4 @@
-"""The messages of a running experiment as topics for other tools, and their recording into MCAP."""
+"""The messages of a running experiment as topics for other tools, live or recorded into MCAP."""
 import math
 import re
 import time
@@ -7,13 +7,18 @@ from typing import Any
 
 from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
+from ..places import how_to_install
 from ..run import COLUMNS
-from . import messages
-from .mcap_file import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC
-from .messages import McapFile, Topics
+from .messages import CYCLE_TOPIC, EVENT_TOPIC, LOG_DEFINITION, LOG_TYPE, SIGNALS_TOPIC, McapFile, Topics, row_bytes
 from .recorded import CYCLE_TYPE, LAST_NS, LEVELS, SIGNALS_TYPE, comment
 
 STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
+#: the protocol knows no token, so other computers get in by ssh only
+HOST = '127.0.0.1'
+#: messages that wait for one viewer, 8 s at 1 kHz; the oldest give way
+BACKLOG = 8192
+#: the package keeps a closed channel's object, so a hostile network may not open ever more
+MOST_CHANNELS = 1000
 
 
 def received(url: str, prefix: str, idle_s: float | None, seconds: float | None) -> Iterator[tuple[str, Any]]:
@@ -73,17 +78,18 @@ class Translator:
             return
         row = row_of(message)
         if wanted[0]:
-            self._topics.write(CYCLE_TOPIC, self._last_ns, messages.row([float(row.get(name, math.nan)) for name in COLUMNS]))
+            values = [float(row.get(name, math.nan)) for name in COLUMNS]
+            self._topics.write(CYCLE_TOPIC, self._last_ns, row_bytes(values))
         values = [float(row.get(name, math.nan)) for name in self._signals]
         if wanted[1] and not all(map(math.isnan, values)):
-            self._topics.write(SIGNALS_TOPIC, self._last_ns, messages.row(values))
+            self._topics.write(SIGNALS_TOPIC, self._last_ns, row_bytes(values))
 
     def _status_t(self, message: Any) -> None:
         values = {name: float(getattr(message, name)) for name in message.__slots__}
         if STATUS_TOPIC not in self._topics.channels:
             self._topics.add_struct(STATUS_TOPIC, STATUS_TYPE,
                                     [(name, comment(name) if name in QUANTITIES else '') for name in values])
-        self._topics.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), messages.row(list(values.values())))
+        self._topics.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), row_bytes(list(values.values())))
 
     def _event_t(self, message: Any) -> None:
         text = message.message or message.reason_text
@@ -123,3 +129,56 @@ class Recorder(Translator):
         self._mcap.describe('abs_hil', {'source': 'live', 'rows': str(self.rows), 'lost_messages': str(self.lost),
                                         'damaged_messages': str(self.damaged), **facts})
         self._mcap.finish()
+
+
+class Foxglove(Translator):
+    """The same messages as an MCAP file's, live, for Foxglove, Lichtblick and PlotJuggler: the protocol foxglove.sdk.v1 by the
+    package foxglove-sdk, whose threads are this process's only. Serves from now on. Raises ImportError without the package,
+    OSError if the port cannot be used."""
+
+    def __init__(self, port: int) -> None:
+        self._channels = Channels(port)
+        super().__init__(self._channels)
+        self._channels.add(EVENT_TOPIC, LOG_TYPE, LOG_DEFINITION)  # now, so that a viewer gets the first one
+        self.link = f'ws://{HOST}:{self._channels.server.port}'
+
+    def stop(self) -> None:
+        self._channels.server.stop()
+
+
+class Channels(Topics):
+    """The topics of one server."""
+
+    def __init__(self, port: int) -> None:
+        try:
+            import foxglove
+        except ImportError as error:
+            raise ImportError(f'--foxglove needs the Python package foxglove-sdk ({error}); install it: '
+                              f'{how_to_install("foxglove-sdk")}') from None
+        super().__init__()
+        self._package: Any = foxglove
+        self._context: Any = foxglove.Context()
+        self._made = 0
+        try:
+            # Without capabilities: a client can send nothing but what it wants to see.
+            self.server: Any = foxglove.start_server(name='abs_hil', host=HOST, port=port, capabilities=[],
+                                                     context=self._context, message_backlog_size=BACKLOG)
+        except RuntimeError as error:
+            raise OSError(f'--foxglove cannot listen at {HOST}, port {port}: {error}; give another port') from None
+
+    def wants(self, topic: str) -> bool:
+        return topic in self.channels and bool(self.channels[topic].has_sinks())
+
+    def write(self, topic: str, time_ns: int, data: bytes) -> None:
+        if topic in self.channels:
+            self.channels[topic].log(data, log_time=time_ns)
+
+    def add(self, topic: str, type_name: str, definition: str) -> None:
+        """A topic that exists already gets another definition."""
+        if topic in self.channels:
+            self.channels.pop(topic).close()
+        if self._made == MOST_CHANNELS:
+            return
+        self._made += 1
+        schema = self._package.Schema(name=type_name, encoding='ros2msg', data=definition.encode())
+        self.channels[topic] = self._package.Channel(topic, message_encoding='cdr', schema=schema, context=self._context)

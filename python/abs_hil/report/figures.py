@@ -2,11 +2,11 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
-from ..rows import Rows
+from ..run import Run
 from .files import RunFiles
 from .model import Bar, Curve, Figure, Label, Mark, Panel, Shade, Style, axis_around, phase_colour, run_style, thinned
 from .survey import JUDGED_M_S, Survey, survey
@@ -27,25 +27,13 @@ MOST_DRAWN = 1e30  # axes are drawn in single precision
 PX_A_MARK = 34.0
 REFERENCE, SECOND = Style('#000000', (2, 3), 1.1), Style('#D55E00', (7, 4), 1.3)
 TIME = Label('time since the start of the run, <i>t</i> / s', 'time since the start of the run, $t$ / s')
-
-
-def _symbol(letter: str, index: str, unit: str) -> Label:
-    sub = f'<sub>{index}</sub>' if index else ''
-    greek = {'ω': r'\omega', 'λ': r'\lambda', 'θ': r'\theta'}[letter]
-    below = f'_{{{index}}}' if index else ''
-    return Label(f'<i>{letter}</i>{sub}{unit}', f'${greek}{below}${unit}')
-
-
-@dataclass
-class Choice:
-    """Which part of the runs the figures show: braking with a margin, the whole run, or seconds of the run."""
-    kind: str = 'brake'
-    range: tuple[float, float] = (0.0, 0.0)
+#: which part of the runs the figures show: 'brake', braking with a margin; 'run', all; or seconds of the run
+Choice = Union[str, tuple[float, float]]
 
 
 @dataclass
 class Options:
-    choice: Choice = field(default_factory=Choice)
+    choice: Choice = 'brake'
     paper_colours: bool = False
     groups: list[int] = field(default_factory=list)  # of each run; runs of one group share a style. Empty: none
     group_labels: list[str] = field(default_factory=list)
@@ -67,9 +55,9 @@ class Profile:
 
 
 def window_of(found: Survey, choice: Choice, braking: bool) -> Window:
-    if choice.kind == 'given':
-        return Window(*choice.range, 0.0)
-    if choice.kind == 'brake' and braking:
+    if not isinstance(choice, str):
+        return Window(*choice, 0.0)
+    if choice == 'brake' and braking:
         return Window(found.brake_from_s - BESIDE_BRAKE_S, found.brake_to_s + BESIDE_BRAKE_S, found.brake_from_s)
     return Window(found.from_s, found.to_s, 0.0)
 
@@ -99,9 +87,9 @@ def _requests(found: Survey, window: Window) -> Iterator[tuple[str, str, str, bo
         yield f'signal {signal}', signal, '', False, window
 
 
-def profiles_of(rows: Rows, found: Survey, window: Window, most_stretches: int) -> dict[str, Profile]:
+def profiles_of(rows: Run, found: Survey, window: Window, most_stretches: int) -> dict[str, Profile]:
     """Every curve of a run, thinned."""
-    time, braking = rows.time_s, rows.braking
+    time, braking = rows.columns['time_s'], rows.columns['phase'] == 'brake'
     speed = rows.columns['omega2_rad_s' if 'omega2_rad_s' in found.known else 'omega2_est_rad_s']
     with np.errstate(invalid='ignore'):
         judged = braking & (found.r2_m * speed > JUDGED_M_S)
@@ -117,8 +105,7 @@ def profiles_of(rows: Rows, found: Survey, window: Window, most_stretches: int) 
             values = np.where(braking[inside], values, np.nan)
         relevant = values[judged[inside] & np.isfinite(values)]
         profile = Profile(*thinned(time[inside] - part.zero_s, values, most_stretches))
-        if len(profile.y) and np.isnan(profile.y).all():
-            profile.x, profile.y = profile.x[:0], profile.y[:0]
+
         if len(relevant):
             profile.relevant = float(relevant.min()), float(relevant.max())
         profiles[name] = profile
@@ -239,7 +226,8 @@ class FigureMaker:
 
     def _speed(self, wheel: int) -> Figure:
         name, upper = f'omega{wheel}', wheel == 1
-        panel = Panel(_symbol('ω', str(wheel), ' / (rad/s)'), height_px=240.0, title=f'ω{"₁" if upper else "₂"}', unit='rad/s')
+        label = Label(f'<i>ω</i><sub>{wheel}</sub> / (rad/s)', rf'$\omega_{{{wheel}}}$ / (rad/s)')
+        panel = Panel(label, height_px=240.0, title=f'ω{"₁" if upper else "₂"}', unit='rad/s')
         if len(self.runs) == 1 and f'{name}_rad_s' in self.surveys[0].known:
             self._add(panel, 0, name, self._style(0), 'wheel', 'wheel')
             self._add(panel, 0, f'{name}_est', SECOND, 'estimate', 'estimate')
@@ -276,8 +264,8 @@ class FigureMaker:
                    if truth else 'Estimate only: these runs have no true θ, so the error is unknown.')
         if not any('theta_est_N' in found.known for found in self.surveys):
             caption += ' No controller of these runs estimates θ.'
-        theta = self._panel('theta_est', _symbol('θ', '', ' / N'), DOUBLE_PX if truth else 240.0, title='θ estimate', unit='N',
-                            y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
+        theta = self._panel('theta_est', Label('<i>θ</i> / N', r'$\theta$ / N'), DOUBLE_PX if truth else 240.0, title='θ estimate',
+                            unit='N', y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
         panels = [theta]
         if truth:
             self._add_reference(theta, 'theta', "plant's value")
@@ -348,15 +336,16 @@ def run_figures(runs: list[RunFiles], options: Options,
         found = survey(run, rows)
         surveys.append(found)
         windows.append(window_of(found, options.choice, found.brakes))
-        shown |= bool(((rows.time_s >= windows[-1].from_s) & (rows.time_s <= windows[-1].to_s)).any())
+        time_s = rows.columns['time_s']
+        shown |= bool(((time_s >= windows[-1].from_s) & (time_s <= windows[-1].to_s)).any())
         profiles.append(profiles_of(rows, found, windows[-1], stretches))
         if progress is not None:
             progress(number, len(runs))
     if not shown:
         raise ValueError(f'--window {windows[0].from_s:g}:{windows[0].to_s:g} holds no row; give seconds within '
                          f'{min(found.from_s for found in surveys):g}:{max(found.to_s for found in surveys):g}')
-    braking = options.choice.kind == 'brake' and all(found.brakes for found in surveys)
-    if options.choice.kind == 'brake' and not braking:
+    braking = options.choice == 'brake' and all(found.brakes for found in surveys)
+    if options.choice == 'brake' and not braking:
         for number, found in enumerate(surveys):
             if found.brakes:
                 windows[number] = window_of(found, options.choice, False)

@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from ..merits import number_in
-from ..nesting import parse_toml
-from ..recording import CSV, kind_of, load, named, read_events, rows_of, run_names, runs_in_series
-from ..rows import Rows
-from ..run import Event, flattened, names_apart, read_object, read_text
+from ..files import parse_toml
+from ..recording import CSV, kind_of, load, named, read_events, run_names, runs_in_series
+from ..run import Event, Run, flattened, names_apart, read_object, read_text
 from .text import DASH, clean, number_text
 
 NAME_CHARACTERS = 40
@@ -57,12 +55,9 @@ class RunFiles:
         value = self.summary.get(key)
         return clean(value) if isinstance(value, str) else ''
 
-    def config_number(self, key: str, otherwise: float) -> float:
-        return number_in(self.config, key, otherwise)
-
-    def rows(self) -> Rows:
+    def rows(self) -> Run:
         """Read anew each time: the rows of many runs do not fill the memory."""
-        return rows_of(self.source)
+        return load(self.source)
 
 
 @dataclass

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..estimates import Estimate, of_mean
-from ..merits import FigureOfMerit, figures
+from ..merits import Estimate, FigureOfMerit, figures, number_in, of_mean
 from .files import RunFiles, differing_keys
 from .model import Curve, Figure, Label, Panel, Style
 from .survey import Survey, merits_shown, value_of
@@ -49,7 +48,7 @@ def study(name: str, numbers: list[int], runs: list[RunFiles]) -> SeriesStudy:
             parts = [f'{key.rpartition(".")[2]} = {value}' for key, value in zip(found.keys, values)][:MOST_KEYS_IN_LABEL]
             label = ', '.join(parts + (['…'] if len(found.keys) > MOST_KEYS_IN_LABEL else []))
             known[values] = Group(clean(label, LABEL_CHARACTERS) if label else 'all runs', [],
-                                  runs[number].config_number(found.keys[0], math.nan) if values else math.nan)
+                                  number_in(runs[number].config, found.keys[0], math.nan) if values else math.nan)
         known[values].runs.append(number)
     found.groups = list(known.values())
     if all(math.isfinite(group.value) for group in found.groups):

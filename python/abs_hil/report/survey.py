@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import _core
-from ..merits import PAPER_R2_M, FigureOfMerit, figures, figures_of, r2_m
-from ..rows import TEXTS, Rows
-from ..run import signals_of
+from ..merits import PAPER_R2_M, FigureOfMerit, figures, figures_of, number_in, r2_m
+from ..rows import TEXTS
+from ..run import Run, signals_of
 from .files import RunFiles
 from .text import significant
 
@@ -69,11 +69,10 @@ class Survey:
         return not math.isnan(self.brake_from_s)
 
 
-def survey(run: RunFiles, rows: Rows) -> Survey:
-    time = rows.time_s
+def survey(run: RunFiles, rows: Run) -> Survey:
+    time, braking = rows.columns['time_s'], rows.columns['phase'] == 'brake'
     found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
     found.r2_m = r2_m(run.config)
-    braking = rows.braking
     kinds = rows.columns['phase']
     names = rows.columns.get('phase_name', kinds)
     starts = np.flatnonzero(np.append(True, (kinds[1:] != kinds[:-1]) | (names[1:] != names[:-1])))
@@ -102,24 +101,24 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
     return found
 
 
-def _pulses(rows: Rows, start: int, end: int) -> np.ndarray:
+def _pulses(rows: Run, start: int, end: int) -> np.ndarray:
     """The rows within a phase of braking, from `start` to before `end`, at which another pulse begins: the brake acts again
     after a release, or the wanted slip steps to another value."""
     acts = np.flatnonzero(rows.columns['brake_torque_ref_Nm'][start:end] > 0.0)
-    again = acts[1:][np.diff(rows.time_s[start + acts]) > RELEASED_S]
+    again = acts[1:][np.diff(rows.columns['time_s'][start + acts]) > RELEASED_S]
     change = np.abs(np.diff(rows.columns['slip_ref'][start:end]))
     stands = change == 0.0
     steps = np.flatnonzero((change[1:-1] >= SLIP_STEP) & stands[:-2] & stands[2:]) + 2
     return start + np.union1d(again, steps)
 
 
-def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
+def _changes(run: RunFiles, rows: Run, r2_m: float) -> list[Change]:
     """When the parameters of the simulated rig changed according to the configuration; only what the run reached.
 
     Unknown distances reach nothing. A profile that cannot be read, as of another version, is left out.
     """
     changes: list[Change] = []
-    time, braking = rows.time_s, rows.braking
+    time, braking = rows.columns['time_s'], rows.columns['phase'] == 'brake'
     rolled = None
     for what in _PROFILES:
         key = f'plant.{what}_profile'
@@ -161,7 +160,7 @@ def contradictions(run: RunFiles, found: Survey) -> list[str]:
     notes, unknown = [], []
     cycles, rows = run.number('cycles'), found.rows + found.truncated
     lost = sum(run.number(name) for name in ('telemetry_drops', 'csv_rows_lost') if run.number(name) > 0)
-    every = max(1.0, run.config_number('telemetry.decimation', 1.0))
+    every = max(1.0, number_in(run.config, 'telemetry.decimation', 1.0))
     logged = math.ceil(cycles / every) if math.isfinite(cycles) else rows  # the CSV may be made of an event log
     if not cycles - lost <= rows <= cycles and rows != logged:
         notes.append(f'the summary counts {cycles:.0f} cycles but the CSV has {found.rows} rows; {why}')

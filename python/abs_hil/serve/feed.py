@@ -2,7 +2,6 @@
 import math
 import os
 import pathlib
-import re
 import time
 from collections.abc import Callable, Iterator
 from operator import attrgetter
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import _core, load_network
+from ..core import _core
 from ..messages import MOST_SIGNALS, PHASES, decode, is_ours, messages_of
 from ..recording import LOG, kind_of, load, named
 from .runs import COLUMNS, DERIVED_PLACE, FIELDS, LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, PLACE, WIDTH, History, RunFacts
@@ -172,16 +171,6 @@ def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float]
     if v_x_m_s < SLOW_M_S:
         return None
     return 1 - r1_m * omega[0] / v_x_m_s, -(J2_kg_m2 * alpha[1] + d2_Nms_rad * omega[1] + M20_Nm) / r2_m
-
-
-class Live:
-    """Packets of an LCM network. Raises OSError without a network, ValueError for a URL that is none."""
-
-    def __init__(self, url: str, prefix: str) -> None:
-        self._subscription = load_network('abs_hil serve').Subscription(url, re.escape(prefix) + '.*')
-
-    def waiting(self) -> list[Packet]:
-        return self._subscription.waiting()
 
 
 class Played:

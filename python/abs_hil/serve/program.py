@@ -1,5 +1,7 @@
 """The command line of abs_serve; `abs_hil serve` starts it."""
+import argparse
 import asyncio
+import re
 import secrets
 import signal
 from typing import Any
@@ -7,8 +9,8 @@ from typing import Any
 from .. import parsers
 from ..core import load_network
 from ..files import refusal
-from ..options import failed
-from .feed import Feed, Live, Played
+from ..options import as_main
+from .feed import Feed, Played
 from .runs import BIN_S, History
 from .server import Command, Server, is_loopback
 
@@ -16,38 +18,31 @@ COMMANDS = ('stop', 'start', 'continue', 'slip-ref', 'gain')
 ANSWER_S = 3.0
 
 
-def main(arguments: list[str]) -> int:
-    given = parsers.serve().parse_args(arguments)
-    try:
-        source = _source(given)
-        if given.commands is not None:
-            load_network('--commands').check_key(given.commands)
-        return 128 + asyncio.run(_serve(given, source))
-    except ValueError as error:
-        return failed('abs_serve', error)
-    except (ImportError, OSError) as error:
-        return failed('abs_serve', error, 3)
+@as_main(parsers.serve, os_error=3)
+def main(given: argparse.Namespace) -> int:
+    source = _source(given)
+    if given.commands is not None:
+        load_network('--commands').check_key(given.commands)
+    return 128 + asyncio.run(_serve(given, source))
 
 
-def _source(given: Any) -> Live | Played:
+def _source(given: argparse.Namespace) -> Any:
+    """What has the packets that are `waiting()`: a network's Subscription, or Played. Raises OSError without a network."""
     if not 0 <= given.port < 65536:
         raise ValueError(f'--port {given.port}: give a number in [0, 65535]')
     if given.log is None:
         if given.speed != 1.0:
             raise ValueError('--speed belongs to LOG')
-        return Live(given.lcm_url, given.prefix)
+        return load_network('abs_hil serve').Subscription(given.lcm_url, re.escape(given.prefix) + '.*')
     if given.commands is not None:
         raise ValueError('--commands belongs to a running experiment, not to LOG')
     if not 0 <= given.speed <= 1000:
         raise ValueError(f'--speed {given.speed:g}: give a number in [0, 1000]')
     if given.foxglove is not None and given.speed == 0:
         raise ValueError('--foxglove shows what comes while it is looked at: give --speed above 0')
-    return Played(given.log, given.speed, _prefix(given))
-
-
-def _prefix(given: Any) -> str:
-    """Of the messages to show; of a recording all, unless a prefix is given."""
-    return '' if given.log is not None and given.prefix == parsers.serve().get_default('prefix') else str(given.prefix)
+    if given.prefix == parsers.serve().get_default('prefix'):
+        given.prefix = ''  # a recording is shown whole, unless a prefix is given
+    return Played(given.log, given.speed, given.prefix)
 
 
 def _sender(given: Any) -> Command:
@@ -63,16 +58,16 @@ def _sender(given: Any) -> Command:
     return send
 
 
-async def _serve(given: Any, source: Live | Played) -> int:
+async def _serve(given: Any, source: Any) -> int:
     """Serves until a signal comes; its number."""
-    feed = Feed(History(), _prefix(given))
+    feed = Feed(History(), given.prefix)
     # Another user of this computer could connect to its own address too, so commands always need the token.
     token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
     shown = given.log or given.lcm_url or 'LCM'
     server = Server(feed, given.host, given.port, token, shown, _sender(given) if given.commands is not None else None)
     foxglove = None
     if given.foxglove is not None:
-        from .foxglove import Foxglove
+        from ..interchange.running import Foxglove
         foxglove = Foxglove(given.foxglove)
         feed.message_listeners.append(foxglove.translate)
     try:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..files import parse_json
 from ..messages import MOST_SIGNALS, PHASES, QUANTITIES, REASONS, TYPES
-from ..nesting import parse_json
 
 #: length of a bin: 50 a second
 BIN_S = 0.02

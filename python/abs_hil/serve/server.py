@@ -16,8 +16,8 @@ from urllib.parse import urlsplit
 import numpy as np
 from aiohttp import web
 
+from ..files import parse_json
 from ..messages import PHASES, QUANTITIES
-from ..nesting import parse_json
 from ..places import charts, misfit
 from ..run import COLUMNS as CSV_COLUMNS
 from ..run import Event, csv_bytes, phase_names

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from aiohttp import WSCloseCode, WSMsgType, web
 
+from ..files import parse_json
 from ..messages import PHASES, REASONS
-from ..nesting import parse_json
 from .feed import Feed
 from .runs import PLACE, RunFacts, own_place
 
@@ -37,23 +37,36 @@ class Trigger:
     """Looks at each cycle until one meets the condition."""
 
     def __init__(self, asked: dict[str, Any]) -> None:
-        self._kind = asked.get('on')
-        self._before = math.nan
-        self._run = -1
-        self._wanted: int | None = None
-        if self._kind == 'level':
-            self._signal, self._level, self._edge = text(asked, 'signal'), real(asked, 'level'), text(asked, 'edge')
-            if self._edge not in ('rise', 'fall', 'either'):
-                raise Bad(f'edge "{self._edge}": give rise, fall or either')
-        elif self._kind == 'phase':
+        self._before, self._run = math.nan, -1  # the last value, and the run that it is of
+        self._words: Callable[[np.ndarray], str] = lambda row: ''
+        kind = asked.get('on')
+        if kind == 'level':
+            self._signal, level, edge = text(asked, 'signal'), real(asked, 'level'), text(asked, 'edge')
+            if edge not in ('rise', 'fall', 'either'):
+                raise Bad(f'edge "{edge}": give rise, fall or either')
+
+            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+                rise, fall = (before < level) & (values >= level), (before > level) & (values <= level)
+                return rise if edge == 'rise' else fall if edge == 'fall' else rise | fall
+        elif kind == 'phase':
             name = _one_of(asked, 'phase', PHASES)
-            self._signal, self._wanted = 'phase_index', PHASES.index(name) if name else None
-        elif self._kind == 'event':
+            self._signal = 'phase_index'
+            self._words = lambda row: dict(enumerate(PHASES)).get(int(row[PLACE['phase']]), '')
+
+            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+                changed = (values != before) & ~np.isnan(before)
+                return changed & (rows[:, PLACE['phase']] == PHASES.index(name)) if name else changed
+        elif kind == 'event':
             name = _one_of(asked, 'event', REASON_KINDS)
+            reasons = [number for number, row in REASONS.items() if number and name in ('', row['kind'])]
             self._signal = 'reason'
-            self._reasons = [number for number, row in REASONS.items() if number and name in ('', row['kind'])]
+            self._words = lambda row: str(REASONS[int(row[PLACE['reason']])]['text'])
+
+            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+                return np.isin(values, reasons)
         else:
-            raise Bad(f'on "{self._kind}": give level, phase or event')
+            raise Bad(f'on "{kind}": give level, phase or event')
+        self._hits = hits
 
     def look(self, run: RunFacts, rows: np.ndarray) -> dict[str, Any] | None:
         """What a viewer is told of the first cycle that meets it; None: none of these does."""
@@ -61,31 +74,13 @@ class Trigger:
         if place is None:
             return None
         values = rows[:, place]
-        first = run.number != self._run
-        before = np.concatenate(([math.nan if first else self._before], values[:-1]))
+        before = np.concatenate(([self._before if run.number == self._run else math.nan], values[:-1]))
         self._run, self._before = run.number, float(values[-1])
-        hit = np.flatnonzero(self._hits(before, values, rows))
-        if not hit.size:
-            return None
-        row = rows[hit[0]]
-        return {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]), 'cycle': int(row[PLACE['cycle']]),
-                'value': float(values[hit[0]]), 'text': self._in_words(row)}
-
-    def _in_words(self, row: np.ndarray) -> str:
-        if self._kind == 'event':
-            return str(REASONS[int(row[PLACE['reason']])]['text'])
-        phase = int(row[PLACE['phase']])
-        return PHASES[phase] if self._kind == 'phase' and 0 <= phase < len(PHASES) else ''
-
-    def _hits(self, before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        if self._kind == 'event':
-            return np.isin(values, self._reasons)
-        if self._kind == 'phase':
-            changed = (values != before) & ~np.isnan(before)
-            return changed if self._wanted is None else changed & (rows[:, PLACE['phase']] == self._wanted)
-        rise = (before < self._level) & (values >= self._level)
-        fall = (before > self._level) & (values <= self._level)
-        return rise if self._edge == 'rise' else fall if self._edge == 'fall' else rise | fall
+        for place in np.flatnonzero(self._hits(before, values, rows))[:1].tolist():
+            row = rows[place]
+            return {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]), 'cycle': int(row[PLACE['cycle']]),
+                    'value': float(values[place]), 'text': self._words(row)}
+        return None
 
 
 class Viewer:
