@@ -11,8 +11,7 @@ PICTURES, EXPORTS = ('pdf', 'png', 'svg'), ('csv', 'json', 'octave', 'parquet')
 #: what varies from episode to episode by default, as `abs_hil compare --vary`
 VARY = 'parameters=0.1,theta=0.1,phase'
 PORT, FOXGLOVE_PORT = 8265, 8765
-
-
+Parser = Callable[[], argparse.ArgumentParser]
 #: endings of all files that programs of this project write or read
 _FORMATS = ('.csv', '.json', '.html', '.lcmlog', '.mcap', '.parquet', '.pdf', '.svg', '.png', '.md', '.toml', '.mat', '.fmu',
             '.xlsx', '.txt')
@@ -28,10 +27,16 @@ class _WholeWords(argparse.HelpFormatter):
         return '\n'.join(indent + line for line in self._split_lines(text, width - len(indent)))
 
 
-def _parser(prog: str, description: str) -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(prog, description=description, allow_abbrev=False, formatter_class=_WholeWords)
-    made.add_argument('--version', action='store_true', help='show version and commit, and exit')  # abs_hil.programs does
-    return made
+def _program(prog: str, description: str) -> Callable[[Callable[[argparse.ArgumentParser], None]], Parser]:
+    """Makes the function that gives a program's parser of one that adds its arguments."""
+    def decorated(add: Callable[[argparse.ArgumentParser], None]) -> Parser:
+        def parser() -> argparse.ArgumentParser:
+            made = argparse.ArgumentParser(prog, description=description, allow_abbrev=False, formatter_class=_WholeWords)
+            made.add_argument('--version', action='store_true', help='show version and commit, and exit')  # abs_hil.programs does
+            add(made)
+            return made
+        return parser
+    return decorated
 
 
 def whole(least: int, most: int) -> Callable[[str], int]:
@@ -58,8 +63,8 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def report() -> argparse.ArgumentParser:
-    made = _parser('abs_report', 'Turns runs into a page with figures and tables, a plain table, or exports their rows')
+@_program('abs_report', 'Turns runs into a page with figures and tables, a plain table, or exports their rows')
+def report(made: argparse.ArgumentParser) -> None:
     made._negative_number_matcher = re.compile(r'-[\d.]')  # --window -5:1 has a value
     made.add_argument('runs', metavar='RUN', nargs='+',
                       help='run folders, series folders, files of runs (event log, CSV, MCAP, Parquet); or the folder of a study')
@@ -87,11 +92,10 @@ def report() -> argparse.ArgumentParser:
         one.add_argument(f'--{kind}', dest='export', action='store_const', const=kind, help=what)
     made.add_argument('--columns', metavar='A,B', action='append', default=[],
                       help='columns to export, separated by commas (default: all)')
-    return made
 
 
-def tune() -> argparse.ArgumentParser:
-    made = _parser('abs_tune', "Searches for a controller's gains in simulation and writes them as a configuration file")
+@_program('abs_tune', "Searches for a controller's gains in simulation and writes them as a configuration file")
+def tune(made: argparse.ArgumentParser) -> None:
     made.add_argument('--controllers', '--controller', metavar='A,B,...',
                       help='controllers to tune (default: all that have gains)')
     made.add_argument('--plants', metavar='A,B,...', default='paper-table1,paper-timing',
@@ -104,12 +108,11 @@ def tune() -> argparse.ArgumentParser:
     made.add_argument('--seed', metavar='N', default=1, type=whole(0, 2**63 - 1), help='seed of the search [1]')
     made.add_argument('--threads', metavar='N', default=0, type=whole(0, 1024),
                       help='number of threads, 0: one for each processor; does not change the results [0]')
-    return made
 
 
-def learn() -> argparse.ArgumentParser:
-    made = _parser('abs_learn', 'Trains a small controller in simulation by trial and error, and compares it with laws of the '
-                   'program (docs/learning.md)')
+@_program('abs_learn', 'Trains a small controller in simulation by trial and error, and compares it with laws of the '
+          'program (docs/learning.md)')
+def learn(made: argparse.ArgumentParser) -> None:
     made.add_argument('--plant', metavar='NAME|FILE', default='paper-timing', help='nominal plant [paper-timing]')
     made.add_argument('--vary', metavar='SPEC', default=VARY, help=f'what varies between episodes [{VARY}]')
     made.add_argument('--generations', metavar='N', type=whole(1, 10**6), default=60, help='generations of the search [60]')
@@ -118,12 +121,10 @@ def learn() -> argparse.ArgumentParser:
     made.add_argument('--out', '--output', metavar='FILE', type=to_write('.json'), dest='output',
                       help='write the weights and the curve as JSON')
     made.add_argument('--figure', metavar='FILE', type=pathlib.Path, help='draw the learning curve (SVG, PDF or PNG)')
-    return made
 
 
-def identify() -> argparse.ArgumentParser:
-    made = _parser('abs_identify', "Estimates the rig's parameters from its own logs and writes a model file "
-                   '(docs/identification.md)')
+@_program('abs_identify', "Estimates the rig's parameters from its own logs and writes a model file (docs/identification.md)")
+def identify(made: argparse.ArgumentParser) -> None:
     made.add_argument('logs', metavar='LOG', nargs='+', help='run folders, event logs, or CSV files with time_s, upper_counts, '
                       'lower_counts, brake_pwm, motor_pwm and, if there, phase and wheels_apart; gzip or not')
     made.add_argument('--start', metavar='NAME|FILE', default='paper-table1',
@@ -140,11 +141,10 @@ def identify() -> argparse.ArgumentParser:
     made.add_argument('--force', action='store_true', help='replace existing files')
     made.add_argument('--seed', metavar='N', type=whole(0, 2**63 - 1), default=1, help='seed of the bootstrap [1]')
     made.add_argument('--no-report', action='store_true', help='write no page, and advise nothing')
-    return made
 
 
-def benchmark() -> argparse.ArgumentParser:
-    made = _parser('abs_hil benchmark', 'How near to the shortest braking a controller comes, over a fixed set of cases.')
+@_program('abs_hil benchmark', 'How near to the shortest braking a controller comes, over a fixed set of cases.')
+def benchmark(made: argparse.ArgumentParser) -> None:
     made.add_argument('--controller', '--controllers', metavar='C,...', action='append', default=[],
                       help='names, FILE.so, FILE.fmu, or MODULE:CLASS of controllers in Python; may be repeated '
                       '(all controllers of the program)')
@@ -163,12 +163,11 @@ def benchmark() -> argparse.ArgumentParser:
     made.add_argument('--json', metavar='FILE', type=to_write('.json'), help='all scores and runs')
     made.add_argument('--out', '--page', metavar='FILE', type=to_write('.html', '.md'), dest='page',
                       help='the page with the groups of cases: HTML with figures for FILE.html, otherwise Markdown')
-    return made
 
 
-def convert() -> argparse.ArgumentParser:
-    made = _parser('abs_convert', 'Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and others '
-                   '(docs/interchange.md)')
+@_program('abs_convert', 'Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and others '
+          '(docs/interchange.md)')
+def convert(made: argparse.ArgumentParser) -> None:
     made.add_argument('files', nargs='*', metavar='FILE', help='IN: run folder, event log (.lcmlog), CSV, MCAP or Parquet; IN#2: '
                       'the second run of a file; then OUT, the file to write')
     made.add_argument('--out', metavar='OUT', help='file to write: .csv, .mcap or .parquet; the last FILE otherwise')
@@ -176,11 +175,10 @@ def convert() -> argparse.ArgumentParser:
     made.add_argument('--prefix', default='ABS_', help='its telemetry.channel_prefix (default: %(default)s)')
     made.add_argument('--idle', type=float, metavar='S', help='with --live: end S seconds after the last message')
     made.add_argument('--seconds', type=float, metavar='S', help='with --live: end after S seconds')
-    return made
 
 
-def watch() -> argparse.ArgumentParser:
-    made = _parser('abs_watch', 'Shows a running experiment in this terminal, over LCM; q quits (docs/watching.md)')
+@_program('abs_watch', 'Shows a running experiment in this terminal, over LCM; q quits (docs/watching.md)')
+def watch(made: argparse.ArgumentParser) -> None:
     made.add_argument('--lcm-url', default='', metavar='URL', help='LCM network (default: LCM_DEFAULT_URL, else UDP multicast)')
     made.add_argument('--prefix', default='ABS_', help="the run's telemetry.channel_prefix [%(default)s]")
     made.add_argument('--window', type=float, default=10.0, metavar='S', help='width of the plots, 1 to 60 s [%(default)g]')
@@ -189,12 +187,11 @@ def watch() -> argparse.ArgumentParser:
     how.add_argument('--plain', action='store_true', help='print a line a second, no screen; always so without a terminal')
     how.add_argument('--once', action='store_true', help='print one screen as text; exit status 3 if no message arrives')
     made.add_argument('--timeout', type=float, metavar='S', help='longest wait of --once for messages, s [5]')
-    return made
 
 
-def export_fmu() -> argparse.ArgumentParser:
-    made = _parser('abs_hil export-fmu', 'Writes the simulated rig, or with --controller a slip controller, as an FMU for other '
-                   'tools (docs/interchange.md)')
+@_program('abs_hil export-fmu', 'Writes the simulated rig, or with --controller a slip controller, as an FMU for other '
+          'tools (docs/interchange.md)')
+def export_fmu(made: argparse.ArgumentParser) -> None:
     made.add_argument('--config', metavar='FILE', help='TOML file with any configuration values')
     made.add_argument('--plant', metavar='NAME|FILE', help='simulated plant by name or TOML file')
     made.add_argument('--model', metavar='NAME|FILE', help="the controllers' model of the rig, by name or TOML file (default: the "
@@ -205,12 +202,11 @@ def export_fmu() -> argparse.ArgumentParser:
     made.add_argument('--fmi', metavar='N', type=int, default=2, help='version of FMI, 2 or 3 [%(default)s]')
     made.add_argument('--out', metavar='FILE.fmu', type=to_write('.fmu'), required=True, help='file to write')
     made.add_argument('--force', action='store_true', help='replace an existing file')
-    return made
 
 
-def serve() -> argparse.ArgumentParser:
-    made = _parser('abs_serve', 'Shows a running experiment, or a recorded one, as a scope in the browser (docs/serve.md). It '
-                   'only watches unless --commands is given.')
+@_program('abs_serve', 'Shows a running experiment, or a recorded one, as a scope in the browser (docs/serve.md). It '
+          'only watches unless --commands is given.')
+def serve(made: argparse.ArgumentParser) -> None:
     made.add_argument('log', nargs='?', metavar='LOG', help='event log (.lcmlog), run folder, CSV, MCAP or Parquet to play '
                       'instead of receiving; LOG#2: the second run of a file')
     made.add_argument('--speed', type=float, default=1.0, metavar='X', help='with LOG: times as fast as recorded; 0: at once '
@@ -224,39 +220,33 @@ def serve() -> argparse.ArgumentParser:
                       '(commands.key_file of the run); the link has a token')
     made.add_argument('--foxglove', nargs='?', const=FOXGLOVE_PORT, type=_port, metavar='PORT', help='serve Foxglove, Lichtblick '
                       'and PlotJuggler too (foxglove.sdk.v1), always at 127.0.0.1 (default: %(const)d; 0: any free one)')
-    return made
 
 
-def lab() -> argparse.ArgumentParser:
-    made = _parser('abs_hil lab', 'A page that simulates the rig and its controllers in the browser, without a server.')
+@_program('abs_hil lab', 'A page that simulates the rig and its controllers in the browser, without a server.')
+def lab(made: argparse.ArgumentParser) -> None:
     made.add_argument('--out', metavar='FILE', type=to_write('.html'), default=pathlib.Path('lab.html'), help='page [lab.html]')
     exercises = sorted(path.stem for path in (pathlib.Path(__file__).parent / 'lab' / 'exercises').glob('*.toml'))
     made.add_argument('--exercise', metavar='FILE', help='a TOML file that says what the page asks, hides and offers; or one that '
                       'is ready: ' + ', '.join(exercises))
-    return made
 
 
-def log() -> argparse.ArgumentParser:
-    made = _parser('abs_log', 'Says what recordings hold (docs/telemetry.md)')
+@_program('abs_log', 'Says what recordings hold (docs/telemetry.md)')
+def log(made: argparse.ArgumentParser) -> None:
     made.add_argument('what', choices=('info',), help='format, runs, duration, channels, gaps, result')
     made.add_argument('files', nargs='+', metavar='FILE', help="run folder, anybody's event log, CSV, MCAP or Parquet of a run")
     made.add_argument('--json', action='store_true', help='print it as JSON: a list with an object for each file')
-    return made
 
 
-def rig() -> argparse.ArgumentParser:
-    made = _parser('abs_hil rig', 'Writes a simulated rig that a class does not know, as a file for --plant (docs/class.md)')
+@_program('abs_hil rig', 'Writes a simulated rig that a class does not know, as a file for --plant (docs/class.md)')
+def rig(made: argparse.ArgumentParser) -> None:
     made.add_argument('kind', choices=('steady', 'wandering'), help='whether it changes a little all the time')
     made.add_argument('seed', metavar='SEED', type=whole(0, 2**63 - 1), help='which one; the same number is the same rig')
     made.add_argument('--out', metavar='FILE', type=to_write('.toml'), default=pathlib.Path('rig.toml'), help='[rig.toml]')
     made.add_argument('--force', action='store_true', help='replace an existing file')
-    return made
 
 
-def compare_tables() -> argparse.ArgumentParser:
-    return _parser('abs_compare_tables', 'Makes the tables of abs_hil compare, which starts it (docs/comparison.md).')
-
-
-def python_host() -> argparse.ArgumentParser:
-    return _parser('abs_python_host', 'Runs a controller in Python. abs_hil starts it, for --controller MODULE:CLASS '
-                   '(docs/interchange.md).')
+# abs_hil itself starts these two, which have no options.
+compare_tables = _program('abs_compare_tables', 'Makes the tables of abs_hil compare, which starts it (docs/comparison.md).')(
+    lambda _: None)
+python_host = _program('abs_python_host', 'Runs a controller in Python. abs_hil starts it, for --controller MODULE:CLASS '
+                       '(docs/interchange.md).')(lambda _: None)

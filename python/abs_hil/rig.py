@@ -4,12 +4,12 @@ The plant paper-table1 with a tyre, wheels, brake, bearings and motor of its own
 brake, motor and bearings also change a little all the time, and both encoder discs sit off their centres. J2 and r2 stay those
 of Table 1, as if somebody had measured them.
 """
+import argparse
 import random
-from collections.abc import Sequence
 
 from . import parsers
 from .files import refuse_existing, write_text
-from .options import failed
+from .options import as_main
 from .simulation import keys
 
 #: key: largest change, over the value of START
@@ -47,12 +47,8 @@ def unknown_rig(seed: int, wanders: bool) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    o = parsers.rig().parse_args(arguments)
-    try:
-        refuse_existing(o.out, '--out', o.force)
-        write_text(o.out, unknown_rig(o.seed, o.kind == 'wandering'))
-    except ValueError as error:
-        return failed('abs_hil rig', error)
+@as_main(parsers.rig)
+def main(o: argparse.Namespace) -> None:
+    refuse_existing(o.out, '--out', o.force)
+    write_text(o.out, unknown_rig(o.seed, o.kind == 'wandering'))
     print(f'{o.out}: use it with --plant {o.out}; its parameters are the answer, so do not read it')
-    return 0

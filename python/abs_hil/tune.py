@@ -15,7 +15,7 @@ from . import parsers
 from .core import _core
 from .files import make_folder, write_text, write_whole
 from .merits import OVERSHOOT
-from .options import failed, options
+from .options import as_main, options
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 
 #: the paper brakes from 1625 rpm
@@ -210,14 +210,10 @@ def _tune(controller: str, o: argparse.Namespace) -> None:
     print(f'{controller}: cost {found.cost:.5f}, with the previous gains {found.start_cost:.5f}\n{text}')
 
 
-def main(arguments: list[str]) -> int:
-    o = parsers.tune().parse_args(arguments)
-    try:
-        chosen = tunable() if o.controllers is None else [name for name in o.controllers.split(',') if name]
-        if not chosen or not o.plants.strip(','):
-            raise ValueError('--controllers, --plants: give at least one name, or leave the option out')
-        for controller in chosen:
-            _tune(controller, o)
-    except (ValueError, OSError) as error:
-        return failed('abs_tune', error)
-    return 0
+@as_main(parsers.tune)
+def main(o: argparse.Namespace) -> None:
+    chosen = tunable() if o.controllers is None else [name for name in o.controllers.split(',') if name]
+    if not chosen or not o.plants.strip(','):
+        raise ValueError('--controllers, --plants: give at least one name, or leave the option out')
+    for controller in chosen:
+        _tune(controller, o)

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from abs_hil import programs
-from abs_hil.lab import exercise, page
+from abs_hil.lab import page
 
 WASM = b'\0asm\1\0\0\0'
 
@@ -19,9 +19,9 @@ def with_module(monkeypatch):
 
 
 def test_the_ready_exercises_can_be_read():
-    assert [path.stem for path in exercise.known()] == ['break-the-sliding-mode', 'nominal-unknown-tyre', 'slip-of-the-peak']
-    for path in exercise.known():
-        given = exercise.read(exercise.find(path.stem))
+    assert [path.stem for path in page.exercises()] == ['break-the-sliding-mode', 'nominal-unknown-tyre', 'slip-of-the-peak']
+    for path in page.exercises():
+        given = page.read_exercise(page.found(path.stem))
         assert given['goals'] and given['task'] and given['offered']['keys']
         # A controller that follows the plant's values would know what is hidden.
         for key in given['hidden']['set']:
@@ -47,19 +47,19 @@ def test_refused_exercises(tmp_path, text, message):
     path = tmp_path / 'exercise.toml'
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
-        exercise.read(path)
+        page.read_exercise(path)
 
 
 @pytest.mark.skipif(not os.path.exists('/dev/zero'), reason='needs a device without an end')
 def test_an_exercise_without_an_end():
     with pytest.raises(ValueError, match='"/dev/zero": File too large; give a TOML file'):
-        exercise.read(exercise.find('/dev/zero'))
+        page.read_exercise(page.found('/dev/zero'))
 
 
 def test_a_task_has_its_own_lines(tmp_path):
     path = tmp_path / 'exercise.toml'
     path.write_text('title = "a"\ntask = """\nOne\ntwo.\n\n1. Three\n   four.\n2. Five.\n"""')
-    assert exercise.read(path)['task'] == 'One two.\n\n1. Three four.\n2. Five.'
+    assert page.read_exercise(path)['task'] == 'One two.\n\n1. Three four.\n2. Five.'
 
 
 def test_the_page_holds_all_it_needs(tmp_path, with_module):

@@ -1,16 +1,17 @@
 """abs_learn: a small learner, from scratch: the cross-entropy method over a controller of nine numbers (docs/learning.md)."""
+import argparse
 import json
 import pathlib
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from .. import parsers
 from ..files import write_text, write_whole
-from ..options import failed
+from ..options import as_main
+from ..report import model, pictures
 from .rigs import TRAINING_SEED, Rigs, Task
 
 #: plants on which nobody trains
@@ -94,51 +95,39 @@ def judge(task: Task, policy: Policy | None, law: str, plants: int) -> np.ndarra
 
 
 def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[str, float]) -> None:
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-    picture = Figure(figsize=(7.2, 3.4), layout='constrained')
-    axes = picture.subplots()
-    generations = np.arange(1, len(mean) + 1)
-    axes.plot(generations, mean, color='#0072B2', label='mean of the search')
-    axes.plot(generations, elite, color='#56B4E9', linestyle=':', label='best quarter, on its own plants')
-    for (law, value), colour, dash in zip(laws.items(), ('#D55E00', '#009E73'), ('--', '-.')):
-        axes.axhline(value, color=colour, linestyle=dash, label=law)
-    axes.set_xlabel('generation')
-    axes.set_ylabel('reward of an episode')
-    axes.set_ylim(max(min(mean), 4.0 * min(laws.values(), default=-1.0)), 0.0)
-    axes.grid(color='#e4e4e4')
-    axes.legend(fontsize=8)
-    kind = path.suffix.removeprefix('.') or 'png'
-    with rc_context({'svg.hashsalt': 'abs_hil'}):  # the same bytes each time
-        write_whole(path, partial(picture.savefig, format=kind, metadata={'Date': None} if kind == 'svg' else None))
+    generations = np.arange(1.0, len(mean) + 1.0)
+    lines = {'mean of the search': mean, 'best quarter, on its own plants': elite,
+             **{law: [value] * len(mean) for law, value in laws.items()}}
+    curves = [model.Curve(0, name, model.run_style(number), generations, np.array(values), legend=name)
+              for number, (name, values) in enumerate(lines.items())]
+    lowest = max(min(mean), 4.0 * min(laws.values(), default=-1.0))
+    panel = model.Panel(model.Label.plain('reward of an episode'), curves, (lowest, 0.0), height_px=280.0)
+    figure = model.Figure('learning', 'Learning curve', model.Label.plain('generation'), [panel])
+    pictures.save(figure, path, path.suffix.removeprefix('.') or 'png')
 
 
-def main(arguments: list[str]) -> int:
-    o = parsers.learn().parse_args(arguments)
-    try:
-        if o.figure and o.figure.suffix not in ('', '.svg', '.pdf', '.png'):
-            raise ValueError(f'--figure {o.figure}: give a file .svg, .pdf or .png')
-        for path in filter(None, (o.output, o.figure)):  # no training for a result that would be lost
-            write_whole(path, lambda name: None, probe=True)
-        if o.figure:
-            import matplotlib.figure  # noqa: F401
-        task = Task(plant=o.plant, vary=o.vary)
+@as_main(parsers.learn)
+def main(o: argparse.Namespace) -> None:
+    if o.figure and o.figure.suffix not in ('', '.svg', '.pdf', '.png'):
+        raise ValueError(f'--figure {o.figure}: give a file .svg, .pdf or .png')
+    for path in filter(None, (o.output, o.figure)):  # no training for a result that would be lost
+        write_whole(path, lambda name: None, probe=True)
+    if o.figure:
+        import matplotlib.figure  # noqa: F401
+    task = Task(plant=o.plant, vary=o.vary)
 
-        def progress(generation: int, reward: float) -> None:
-            print(f'generation {generation} of {o.generations}, reward {reward:.3f}', file=sys.stderr)
+    def progress(generation: int, reward: float) -> None:
+        print(f'generation {generation} of {o.generations}, reward {reward:.3f}', file=sys.stderr)
 
-        policy, curve = train(task, o.generations, o.seed, progress=progress)
-        rewards = {'learned': judge(task, Policy(policy.weights), '', o.judge)}
-        rewards.update({law: judge(task, None, law, o.judge) for law in LAWS})
-        print(f'{"reward on " + str(o.judge) + " plants":<24}  {"mean":>8}  {"median":>8}  {"worst":>8}')
-        for name, values in rewards.items():
-            print(f'{name:<24}  {values.mean():8.3f}  {np.median(values):8.3f}  {values.min():8.3f}')
-        if o.output:
-            data = {'weights': policy.weights.tolist(), 'curve': curve.mean, 'elite': curve.elite,
-                    'rewards': {name: values.tolist() for name, values in rewards.items()}}
-            write_text(o.output, json.dumps(data, indent=1) + '\n')
-        if o.figure:
-            _draw(o.figure, curve.elite, curve.mean, {law: float(rewards[law].mean()) for law in LAWS})
-    except (ValueError, OSError) as error:
-        return failed('abs_learn', error)
-    return 0
+    policy, curve = train(task, o.generations, o.seed, progress=progress)
+    rewards = {'learned': judge(task, Policy(policy.weights), '', o.judge)}
+    rewards.update({law: judge(task, None, law, o.judge) for law in LAWS})
+    print(f'{"reward on " + str(o.judge) + " plants":<24}  {"mean":>8}  {"median":>8}  {"worst":>8}')
+    for name, values in rewards.items():
+        print(f'{name:<24}  {values.mean():8.3f}  {np.median(values):8.3f}  {values.min():8.3f}')
+    if o.output:
+        data = {'weights': policy.weights.tolist(), 'curve': curve.mean, 'elite': curve.elite,
+                'rewards': {name: values.tolist() for name, values in rewards.items()}}
+        write_text(o.output, json.dumps(data, indent=1) + '\n')
+    if o.figure:
+        _draw(o.figure, curve.elite, curve.mean, {law: float(rewards[law].mean()) for law in LAWS})

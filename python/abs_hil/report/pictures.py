@@ -95,19 +95,24 @@ def _drawn(figure: Figure) -> Any:
     return picture
 
 
+def save(figure: Figure, path: pathlib.Path, kind: str) -> None:
+    """Writes a figure, as the same bytes each time. Raises ValueError."""
+    os.environ.setdefault('MPLBACKEND', 'agg')
+    import logging
+
+    import matplotlib
+    logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)  # the fonts' names are a wish
+    stamps: dict[str, dict[str, Any]] = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
+    with matplotlib.rc_context(_RC):
+        write_whole(path, partial(_drawn(figure).savefig, format=kind, dpi=DPI, metadata=stamps.get(kind, {})))
+
+
 def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool) -> list[pathlib.Path]:
     """Writes the figures into `folder`, which it creates. Replaces an existing file only if asked. Raises ValueError."""
     make_folder(folder, '--figures')
     paths = [folder / f'{figure.id}.{kind}' for figure in figures]
     for path in paths:
         refuse_existing(path, 'folder', replace)
-    os.environ.setdefault('MPLBACKEND', 'agg')
-    import logging
-
-    import matplotlib
-    logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)  # the fonts' names are a wish
-    with matplotlib.rc_context(_RC):
-        for figure, path in zip(figures, paths):
-            stamps: dict[str, dict[str, Any]] = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
-            write_whole(path, partial(_drawn(figure).savefig, format=kind, dpi=DPI, metadata=stamps.get(kind, {})))
+    for figure, path in zip(figures, paths):
+        save(figure, path, kind)
     return paths
