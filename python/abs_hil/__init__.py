@@ -13,13 +13,12 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
+from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, live, row_of
 
 if TYPE_CHECKING:
     __version__: str
     from .identification import Identified, identify
     from .merits import FigureOfMerit, figures
-    from .network import live
     from .recording import load, load_series
     from .run import Run, Series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many, simulate_series
@@ -32,7 +31,6 @@ globals().update(TYPES)
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
 _LATER = {'merits': ('FigureOfMerit', 'figures'),
           'identification': ('Identified', 'identify'),
-          'network': ('live',),
           'recording': ('load', 'load_series'),
           'run': ('Run', 'Series'),
           'stepped': ('Controller', 'Plant', 'PlantState', 'SlipInput', 'SlipOutput'),

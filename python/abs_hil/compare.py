@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import parsers
-from .estimates import Estimate, of_difference, of_mean, of_ratio
-from .merits import FigureOfMerit, figures
+from .merits import Estimate, FigureOfMerit, figures, of_difference, of_mean, of_ratio
 from .options import failed
 
 #: figures whose ratio of adaptive to sliding-mode, paired by run, stands beside the paper's claim: by their key in JSON
@@ -119,7 +118,7 @@ def _aligned(cells: Cells) -> str:
                    for row in cells)
 
 
-def _in_markdown(cells: Cells) -> str:
+def in_markdown(cells: Cells) -> str:
     head, *lines = (f'| {" | ".join(row)} |\n' for row in cells)
     return head + '|---|' + '---:|' * (len(cells[0]) - 1) + '\n' + ''.join(lines)
 
@@ -212,7 +211,7 @@ def texts_of(facts: dict[str, Any], names: Sequence[str], rows: Sequence[Sequenc
     facts.update(plant=first['plant'][0], experiment=first['experiment'][0], start_speed_rad_s=brake['start_speed_rad_s'],
                  end_speed_m_s=brake['end_speed_m_s'], slip_ref=facts['config']['control']['slip_ref'])
     return {'text': _page(facts, columns, _aligned, '\nDifferences, paired by plant:\n'),
-            'markdown': _page(facts, columns, _in_markdown, '\n'), 'csv': _table_csv(columns), 'runs': _runs_csv(columns),
+            'markdown': _page(facts, columns, in_markdown, '\n'), 'csv': _table_csv(columns), 'runs': _runs_csv(columns),
             'json': _json(facts, columns)}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from abs_hil import compare, estimates
+from abs_hil import compare, merits
 from abs_hil.merits import figures
 
 NAN = math.nan
@@ -23,7 +23,7 @@ def half_width(values):
 
 def test_the_mean_of_a_sample_worked_by_hand():
     # 2, 4, 4, 4, 10: mean 4.8, squares 7.84 + 3 * 0.64 + 27.04 = 36.8, s^2 = 9.2, t(4) = 2.776445.
-    found = estimates.of_mean([2.0, 4.0, 4.0, 4.0, 10.0])
+    found = merits.of_mean([2.0, 4.0, 4.0, 4.0, 10.0])
     assert found.n == 5 and found.mean == pytest.approx(4.8, abs=1e-12)
     assert found.deviation == pytest.approx(math.sqrt(9.2), abs=1e-12)
     assert found.half_width == pytest.approx(2.776445 * math.sqrt(9.2 / 5.0), abs=1e-5)
@@ -33,41 +33,41 @@ def test_the_mean_of_a_sample_worked_by_hand():
 @pytest.mark.parametrize('n', [2, 3, 10, 100, 5000])
 def test_intervals_are_those_of_scipy(n):
     values = np.random.default_rng(n).normal(3.0, 2.0, n)
-    found = estimates.of_mean(values)
+    found = merits.of_mean(values)
     low, high = stats.t.interval(0.95, n - 1, loc=np.mean(values), scale=stats.sem(values))
     assert found[1:] == pytest.approx((np.mean(values), np.std(values, ddof=1), low, high), rel=1e-10)
 
 
 def test_missing_values_are_left_out_and_small_samples_have_no_interval():
-    found = estimates.of_mean([1.0, NAN, 3.0])
+    found = merits.of_mean([1.0, NAN, 3.0])
     assert found[:2] == (2, 2.0) and found.half_width == pytest.approx(12.7062, abs=1e-3)  # t(1) s / sqrt(2), s = sqrt(2)
-    one, none = estimates.of_mean([7.0]), estimates.of_mean([NAN, NAN])
+    one, none = merits.of_mean([7.0]), merits.of_mean([NAN, NAN])
     assert one[:2] == (1, 7.0) and np.isnan(one[2:]).all()
     assert none.n == 0 and np.isnan(none[1:]).all()
 
 
 def test_a_paired_difference_cancels_what_both_share():
     base, values = np.array([1.0, 5.0, 9.0, 13.0, NAN, 1.0]), np.array([1.1, 5.2, 9.1, 13.2, 1.0, NAN])
-    found = estimates.of_difference(values, base)
+    found = merits.of_difference(values, base)
     # s of {.1, .2, .1, .2} is 0.057735; t(3) = 3.182446.
     assert found.n == 4 and found.mean == pytest.approx(0.15)
     assert found.half_width == pytest.approx(3.182446 * 0.057735 / 2, abs=1e-6)
-    assert estimates.of_mean(values[:4]).half_width > 50.0 * found.half_width
+    assert merits.of_mean(values[:4]).half_width > 50.0 * found.half_width
     test = stats.ttest_rel(values[:4], base[:4]).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((test.low, test.high))
 
 
 def test_an_inverse_ratio_has_the_inverse_interval():
     base, values = np.array([1.0, 2.0, 4.0, 1.0, -1.0, NAN]), np.array([0.5, 1.1, 1.8, 0.0, 1.0, 1.0])
-    ratio, inverse = estimates.of_ratio(values, base), estimates.of_ratio(base, values)
+    ratio, inverse = merits.of_ratio(values, base), merits.of_ratio(base, values)
     assert ratio.n == 3 and ratio.mean == pytest.approx(stats.gmean([0.5, 0.55, 0.45]))
     assert ratio.low * inverse.high == pytest.approx(1.0) and ratio.high * inverse.low == pytest.approx(1.0)
     assert math.log(ratio.high / ratio.mean) == pytest.approx(half_width(np.log([0.5, 0.55, 0.45])))
-    assert estimates.of_ratio(values[3:], base[3:]).n == 0
+    assert merits.of_ratio(values[3:], base[3:]).n == 0
 
 
 def test_about_95_of_100_intervals_hold_the_true_mean():
-    found = [estimates.of_mean(sample) for sample in np.random.default_rng(12345).random((400, 12))]
+    found = [merits.of_mean(sample) for sample in np.random.default_rng(12345).random((400, 12))]
     # Binomial(400, 0.95): 380 -+ 4.4, four standard deviations either way.
     assert 362 <= sum(one.low <= 0.5 <= one.high for one in found) <= 398
 

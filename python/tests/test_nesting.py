@@ -1,7 +1,7 @@
 """Files that nest without end: a clear error, and never a RecursionError."""
 import pytest
 
-from abs_hil.nesting import MOST_LEVELS, parse_json, parse_toml
+from abs_hil.files import MOST_LEVELS, parse_json, parse_toml
 from abs_hil.report.files import read_toml
 from abs_hil.run import read_object
 

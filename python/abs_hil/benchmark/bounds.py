@@ -4,8 +4,7 @@ import json
 import pathlib
 from collections.abc import Iterable
 
-from ..files import read_text, write_text
-from ..nesting import parse_json
+from ..files import parse_json, read_text, write_text
 from ..options import Value
 from ..stepped import Plant
 from .cases import COAST_S, END_SPEED_M_S, VERSION, Case

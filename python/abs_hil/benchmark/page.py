@@ -4,10 +4,10 @@ import json
 import math
 import pathlib
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from ..compare import in_markdown
 from ..core import _core
 from ..report.model import STYLES, Curve, Figure, Label, Panel, run_style
 from ..report.page import render, view
@@ -43,9 +43,7 @@ def cells(results: Sequence[Result], group: str = 'all') -> list[list[str]]:
 
 def table(results: Sequence[Result], group: str = 'all') -> str:
     """A Markdown table with a row for each controller."""
-    lines = ['| controller | ' + ' | '.join(HEADINGS) + ' |', '|---' + '|---:' * len(HEADINGS) + '|']
-    lines += [f'| `{name}` | ' + ' | '.join(figures) + ' |' for name, *figures in cells(results, group)]
-    return '\n'.join(lines) + '\n'
+    return in_markdown([['controller', *HEADINGS], *([f'`{name}`', *figures] for name, *figures in cells(results, group))])
 
 
 def title(whole: bool) -> str:
@@ -62,15 +60,12 @@ def text(results: Sequence[Result], whole: bool) -> str:
 
 
 def as_json(results: Sequence[Result], whole: bool, program: str) -> str:
-    def known(value: Any) -> Any:
-        return None if isinstance(value, float) and math.isnan(value) else value
-
     document = {'benchmark': 'abs_hil', 'version': VERSION, 'set': cases.checksum(), 'bounds': bounds.checksum(bounds.stored()),
                 'whole': whole, 'program': program, 'controllers': [
         {'name': result.entry.name, 'warm': result.entry.warm, 'settings': dict(result.entry.settings),
-         'scores': [{key: known(value) for key, value in vars(score).items()} for score in result.scores],
-         'runs': [{key: known(value) for key, value in row.items()} for row in result.rows]} for result in results]}
-    return json.dumps(document, indent=1, ensure_ascii=False) + '\n'
+         'scores': [vars(score) for score in result.scores], 'runs': result.rows} for result in results]}
+    known = json.loads(json.dumps(document), parse_constant=lambda _: None)  # JSON has no NaN
+    return json.dumps(known, indent=1, ensure_ascii=False) + '\n'
 
 
 def _standing(results: Sequence[Result]) -> Figure:

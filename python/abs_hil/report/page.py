@@ -83,10 +83,10 @@ def view(figure: Figure, heading: str = '') -> dict[str, Any]:
 
 def page(figures: list[Figure], series: list[dict[str, Any]], timing_figure: Figure | None, paper: dict[str, Any] | None,
          runs: int, **parts: Any) -> str:
-    """The page of runs. series: name, figure and tables of each; paper: claims, and statements by figure; parts: texts and
-    tables, by the template's names."""
+    """The page of runs. series: name, figure and tables of each; paper: claims, and a Pair for each figure of merit; parts:
+    texts and tables, by the template's names."""
     if paper is not None:
-        shown = [figure for figure in figures if figure.id in paper['statements']]
+        shown = [figure for figure in figures if figure.paper]
     else:
         shown = [figures[0], *(part['figure'] for part in series), *figures[1:], *([timing_figure] if timing_figure else [])]
     views = {}

@@ -23,8 +23,9 @@ class Pair:
         return shown(self.values[run], self.decimals)
 
     @property
-    def per_cent(self) -> float:
-        return 100.0 * (self.values[0] / self.values[1] - 1.0) if self.values[1] else math.nan
+    def change(self) -> str:
+        """Of the adaptive controller against its baseline."""
+        return _signed(100.0 * (self.values[0] / self.values[1] - 1.0) if self.values[1] else math.nan)
 
     @property
     def verdict(self) -> str:
@@ -66,29 +67,7 @@ def pairs_of(runs: list[RunFiles], surveys: list[Survey]) -> dict[str, Pair]:
 def claims(pairs: dict[str, Pair]) -> Table:
     time, distance, claim = pairs['stop_time_s'], pairs['stop_distance_m'], _signed(CLAIMED_PER_CENT)
     return Table('claims', ['', 'the paper', 'these runs'], [
-        ['stop time, adaptive against sliding mode', claim, _signed(time.per_cent)],
-        ['stop distance, adaptive against sliding mode', claim, _signed(distance.per_cent)],
+        ['stop time, adaptive against sliding mode', claim, time.change],
+        ['stop distance, adaptive against sliding mode', claim, distance.change],
         ['stop time of the adaptive controller / s', f'about {shown(PLOTTED_STOP_S, 1)}', time[0]],
         ['runs of each controller', '1', '1']])
-
-
-def statements(pairs: dict[str, Pair]) -> dict[str, tuple[str, str]]:
-    """For each of the paper's figures: a paraphrase of its statement, and the result of these two runs."""
-    time, distance, rms, settling = (pairs[key] for key in ('stop_time_s', 'stop_distance_m', 'slip_rms', 'slip_settling_s'))
-    variation, theta = pairs['torque_total_variation_Nm'], pairs['theta_error_final']
-    settled = ['never settles within 0.02' if settling[run] == DASH else f'settles after {settling[run]} s'
-               for run in range(2)]
-    wheels = 'Both controllers decelerate; the proposed one stops a few tenths of a second earlier.'
-    times = f'{time.verdict}: stop times {time[0]} s and {time[1]} s.'
-    return {
-        'fig5': (wheels, times),
-        'fig6': (wheels, times),
-        'fig7': ('The proposed controller reaches the slip 0.15 faster and stays closer to it. Towards standstill the '
-                 'performance is no longer relevant.',
-                 f'{rms.verdict}: RMS errors {rms[0]} and {rms[1]}; the first {settled[0]}, the second {settled[1]}.'),
-        'fig8': ('No chattering, which the sliding mode shows.',
-                 f'{variation.verdict}: the torque references vary by {variation[0]} N m and {variation[1]} N m in total.'),
-        'fig9': ('Estimates of both controllers; unreliable at the end of braking.',
-                 f'Relative errors of the estimates at 3 m/s: {theta[0]} and {theta[1]}.'),
-        'fig10': (f'About {shown(-CLAIMED_PER_CENT, 1)} % less time and distance.',
-                  f'Time {_signed(time.per_cent)}, distance {_signed(distance.per_cent)} against the sliding mode.')}

@@ -82,7 +82,7 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
     pairs = paper.pairs_of(runs, surveys) if of_paper else {}
     parts = {'title': clean(title) or _title(found, of_paper), 'version': _core.version,
              'lead': paper.lead(runs) if of_paper else _lead(runs), 'runs': len(runs), 'figures': figures, 'series': series,
-             'paper': {'claims': paper.claims(pairs), 'statements': paper.statements(pairs)} if of_paper else None,
+             'paper': {'claims': paper.claims(pairs), **pairs} if of_paper else None,
              'metrics': metrics, 'shared': shared, 'phases': tables.phases_table(runs, surveys), 'events': events,
              'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
              'timing_figure': timing, 'environment': tables.environment_table(runs),
@@ -93,10 +93,10 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
 
 def _choice(text: str) -> Choice:
     if text in ('brake', 'run'):
-        return Choice(text)
+        return text
     number = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
     if (found := re.fullmatch(f'({number}):({number})', text)) and float(found[1]) < float(found[2]):
-        return Choice('given', (float(found[1]), float(found[2])))
+        return float(found[1]), float(found[2])
     raise ValueError(f'--window {text}: give brake, run, or FROM:TO in seconds with FROM < TO')
 
 

@@ -47,13 +47,9 @@ class Cell:
 
 
 @cache
-def _meanings() -> dict[str, tuple[str, str]]:
-    return {row['name']: (row['meaning'], row['unit']) for row in _core.keys({})}
-
-
 def title_of(key: str) -> str:
     """What a factor is, with its unit: "peak tyre force / N". A key without a meaning is its own title."""
-    meaning, unit = _meanings().get(key, ('', ''))
+    meaning, unit = next(((row['meaning'], row['unit']) for row in _core.keys({}) if row['name'] == key), ('', ''))
     short = meaning.removeprefix('simulation: ').partition(',')[0].partition(';')[0].partition(':')[0].strip()
     return with_unit(short, unit) or key
 

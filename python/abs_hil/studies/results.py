@@ -12,8 +12,7 @@ import numpy as np
 import pandas
 
 from ..core import _core
-from ..files import write_whole
-from ..nesting import parse_json
+from ..files import parse_json, write_whole
 from ..places import how_to_install
 
 #: what pip is asked for
@@ -121,11 +120,6 @@ class StudyResults:
         rows = self.columns(names)
         complete = self.columns(['result'])['result'] == 'completed'
         return rows if complete.all() else rows[complete]
-
-    @property
-    def complete_runs(self) -> pandas.DataFrame:
-        """All columns of the runs that no fault ended and that could begin."""
-        return self.completed(list(self.data.columns))
 
     @property
     def groups(self) -> list[str]:
