@@ -14,14 +14,13 @@ from . import parsers
 from .core import _core
 from .interchange.messages import McapContent
 from .interchange.recorded import missing_rows
-from .messages import TYPES
+from .messages import TYPES, type_of
 from .options import failed
 from .recording import FOLDER, LOG, MCAP, kind_of, load, missing_in, named, run_names
 from .run import Run
 
 #: where the times of a log of virtual time begin (src/program/run_outputs.cpp), and of those that are not known
 EPOCHS_NS, DAY_NS = (946_684_800 * 10 ** 9, 0), 86_400 * 10 ** 9
-_TYPES = {type_._get_packed_fingerprint(): name for name, type_ in TYPES.items()}
 #: where the number of a message stands in its bytes
 _SEQUENCE = 16
 _FACTS = ('experiment', 'controller', 'plant', 'backend', 'version', 'result', 'reason')
@@ -77,7 +76,7 @@ def _take_log(place: pathlib.Path, told: dict[str, Any]) -> int:
     runs, events = 0, _core.LogEvents(os.fsencode(place))
     try:
         for run, part, _, time_us, channel, data in events:
-            type_ = _TYPES.get(data[:8], '')
+            type_ = type_of(data)
             sequence = struct.unpack_from('>q', data, _SEQUENCE)[0] if type_ and len(data) >= _SEQUENCE + 8 else 0
             channels.setdefault((channel, type_), {}).setdefault(run, []).append((time_us * 1000, len(data), sequence))
             runs = max(runs, run + 1) if type_ in ('telemetry_t', 'experiment_t') else runs

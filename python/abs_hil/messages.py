@@ -46,9 +46,9 @@ def row_of(message: Any) -> dict[str, Any]:
     return {**row, **dict(zip(filter(None, message.names.split(',')), message.values))}
 
 
-def is_ours(data: bytes) -> bool:
-    """True for a message that begins as one of our types."""
-    return bytes(data[:8]) in _BY_FINGERPRINT
+def type_of(data: bytes) -> str:
+    """The name of our type as which a message begins; empty for another's."""
+    return getattr(_BY_FINGERPRINT.get(bytes(data[:8])), '__name__', '')
 
 
 def messages_of(run: Any) -> Iterator[tuple[int, str, bytes]]:

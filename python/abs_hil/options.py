@@ -43,17 +43,19 @@ def failed(name: str, error: object, status: int = 2) -> int:
     return status
 
 
-def as_main(parser: Callable[[], argparse.ArgumentParser], os_error: int = 2,
+def as_main(parser: Callable[[], argparse.ArgumentParser], *others: type[Exception], os_error: int = 2,
             ) -> Callable[[Callable[[argparse.Namespace], int | None]], Callable[[Sequence[str] | None], int]]:
-    """Makes the main(arguments) of a program of what it does with its options. That may raise ValueError, which is status 2, and
-    OSError, whose status is `os_error`; without a status of its own a program ends with 0."""
+    """Makes the main(arguments) of a program of what it does with its options. That may raise ValueError and the others, which
+    are status 2, and OSError, whose status is `os_error`; without a status of its own a program ends with 0."""
+    told: tuple[type[Exception], ...] = (ValueError, OSError, *others)
+
     def decorated(work: Callable[[argparse.Namespace], int | None]) -> Callable[[Sequence[str] | None], int]:
         @functools.wraps(work)
         def main(arguments: Sequence[str] | None = None) -> int:
             made = parser()
             try:
                 return work(made.parse_args(arguments)) or 0
-            except (ValueError, OSError) as error:
+            except told as error:
                 return failed(made.prog, error, os_error if isinstance(error, OSError) else 2)
         return main
     return decorated

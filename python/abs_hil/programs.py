@@ -79,12 +79,6 @@ def start(name: str, arguments: list[str]) -> int:
     return 1
 
 
-def version(name: str) -> str:
-    """What --version prints: program, version and commit, of the compiled module."""
-    from .core import _core
-    return f'abs_{name} {_core.version}' + (f' ({_core.revision})' if _core.revision != 'unknown' else '')
-
-
 def _start(name: str, arguments: list[str]) -> int:
     # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -93,7 +87,8 @@ def _start(name: str, arguments: list[str]) -> int:
     said = io.StringIO()  # NumPy prints a page about packages that do not fit it
     try:
         if '--version' in arguments:
-            print(version(name))
+            from .core import _core
+            print(f'abs_{name} {_core.version}' + (f' ({_core.revision})' if _core.revision != 'unknown' else ''))
             return 0
         getattr(parsers, name.replace('-', '_'))().parse_args(arguments)  # --help and wrong options end here, without a package
         with contextlib.redirect_stderr(said):

@@ -3,13 +3,13 @@ import argparse
 import math
 import pathlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from .. import parsers
 from ..core import _core
 from ..files import parse_json, read_text, write_text, write_whole
-from ..options import failed, settings_of
+from ..options import as_main, settings_of
 from ..report.page import plotly_js
 from ..simulation import controllers
 from . import bounds, cases
@@ -93,51 +93,47 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = parsers.benchmark()
-    given = parser.parse_args(arguments)
+@as_main(parsers.benchmark, RuntimeError)
+def main(given: argparse.Namespace) -> int:
     idle = ({*vars(given)} - {'verify', 'threads'} if given.verify else () if given.draw is not None else ('bounds', 'count'))
-    try:
-        for name in sorted(idle):
-            if getattr(given, name) != parser.get_default(name):
-                raise ValueError(f'--{name} has no effect {"with --verify" if given.verify else "without --draw"}; leave it out')
-        if given.verify is not None:
-            found = verified(given.verify, given.threads)
-            summary = f'{len(found)} differences from fresh runs' if found else f'{given.verify}: fresh runs give the same'
-            print(*found[:SHOWN], summary, sep='\n')
-            return int(bool(found))
-        settings = settings_of(given.set, 'control.KEY=VALUE')
-        for target in (given.json, given.page):
-            if target is not None:
-                write_whole(target, lambda name: None, probe=True)
-        if given.page is not None and given.page.suffix == '.html':
-            plotly_js()
-        names = [name for text in given.controller for name in text.split(',')]
-        entries = [Entry(name, settings) for name in names or controllers()]
-        chosen, known = _chosen(given)
-        if given.warm:
-            entries = [one for entry in entries for one in
-                       ([entry, Entry(entry.name, settings, True)] if keeps(entry, chosen[0]) else [entry])]
-            if not any(entry.warm for entry in entries):
-                raise ValueError('--warm: none of these controllers keeps anything of the last braking; leave it out, or add '
-                                 '--controller adaptive-optimal')
-        whole = not given.quick and given.draw is None
-        results = []
-        for entry in entries:
-            results.append(run(entry, chosen, known, cases.SEEDS[:1] if given.quick else cases.SEEDS, given.threads))
-            if total := results[-1].total.failed:
-                faults = sorted({row['fault'] or 'no stop' for row in results[-1].rows if math.isnan(row['excess'])})
-                print(f'abs_hil benchmark: {entry.label}: {total} of {len(results[-1].rows)} runs failed: {", ".join(faults)}',
-                      file=sys.stderr)
-            if len(entries) > 1:
-                print(f'abs_hil benchmark: {entry.label}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
-        print(table(results), end='')
-        if given.page is not None:
-            page = html(results, whole) if given.page.suffix == '.html' else text(results, whole)
-        if given.json is not None:
-            write_text(given.json, as_json(results, whole, _core.version))
-        if given.page is not None:
-            write_text(given.page, page)
-    except (ValueError, RuntimeError, OSError) as error:
-        return failed('abs_hil benchmark', error)
+    for name in sorted(idle):
+        if getattr(given, name) != parsers.benchmark().get_default(name):
+            raise ValueError(f'--{name} has no effect {"with --verify" if given.verify else "without --draw"}; leave it out')
+    if given.verify is not None:
+        found = verified(given.verify, given.threads)
+        summary = f'{len(found)} differences from fresh runs' if found else f'{given.verify}: fresh runs give the same'
+        print(*found[:SHOWN], summary, sep='\n')
+        return int(bool(found))
+    settings = settings_of(given.set, 'control.KEY=VALUE')
+    for target in (given.json, given.page):
+        if target is not None:
+            write_whole(target, lambda name: None, probe=True)
+    if given.page is not None and given.page.suffix == '.html':
+        plotly_js()
+    names = [name for text in given.controller for name in text.split(',')]
+    entries = [Entry(name, settings) for name in names or controllers()]
+    chosen, known = _chosen(given)
+    if given.warm:
+        entries = [one for entry in entries for one in
+                   ([entry, Entry(entry.name, settings, True)] if keeps(entry, chosen[0]) else [entry])]
+        if not any(entry.warm for entry in entries):
+            raise ValueError('--warm: none of these controllers keeps anything of the last braking; leave it out, or add '
+                             '--controller adaptive-optimal')
+    whole = not given.quick and given.draw is None
+    results = []
+    for entry in entries:
+        results.append(run(entry, chosen, known, cases.SEEDS[:1] if given.quick else cases.SEEDS, given.threads))
+        if total := results[-1].total.failed:
+            faults = sorted({row['fault'] or 'no stop' for row in results[-1].rows if math.isnan(row['excess'])})
+            print(f'abs_hil benchmark: {entry.label}: {total} of {len(results[-1].rows)} runs failed: {", ".join(faults)}',
+                  file=sys.stderr)
+        if len(entries) > 1:
+            print(f'abs_hil benchmark: {entry.label}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
+    print(table(results), end='')
+    if given.page is not None:
+        page = html(results, whole) if given.page.suffix == '.html' else text(results, whole)
+    if given.json is not None:
+        write_text(given.json, as_json(results, whole, _core.version))
+    if given.page is not None:
+        write_text(given.page, page)
     return 0

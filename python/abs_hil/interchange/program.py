@@ -38,7 +38,6 @@ def main(arguments: list[str]) -> int:
 
 def _convert(path: str, output: pathlib.Path) -> str:
     from . import recorded
-
     origin = named(path)[0].resolve()
     if output.resolve() == origin or origin.is_dir() and output.resolve().parent == origin:
         raise ValueError(f'OUT = {output}: this command reads it; give another file')

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from ..messages import MOST_SIGNALS, PHASES, decode, is_ours, messages_of
+from ..messages import MOST_SIGNALS, PHASES, decode, messages_of, type_of
 from ..recording import LOG, kind_of, load, named
 from .runs import COLUMNS, DERIVED_PLACE, FIELDS, LONGEST_S, MESSAGES, MOST_RUNS, MOST_TEXT, PLACE, WIDTH, History, RunFacts
 
@@ -207,7 +207,7 @@ def recorded_packets(name: str, prefix: str = '') -> Iterator[tuple[int, str, by
     if number or len({channel for channel in runs.values() if channel.startswith(prefix)}) > 1:
         number = _core.chosen_run(os.fsencode(name), max(runs, default=-1) + 1) + 1
     for run, _, _, time_us, channel, data in _events(place):
-        if number in (0, run + 1) and channel.startswith(prefix) and is_ours(data):
+        if number in (0, run + 1) and channel.startswith(prefix) and type_of(data):
             yield time_us, channel, data
 
 

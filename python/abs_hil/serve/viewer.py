@@ -249,12 +249,8 @@ class Viewer:
 
 def columns_of(run: RunFacts, rows: np.ndarray, names: list[str]) -> np.ndarray:
     """The signals of rows of WIDTH values, of shape (signals, rows); NaN for one that the run lacks."""
-    kept = np.full((len(names), len(rows)), np.nan)
-    for line, name in zip(kept, names):
-        place = own_place(run.own, name)
-        if place is not None:
-            line[:] = rows[:, place]
-    return kept
+    places = [own_place(run.own, name) for name in names]
+    return np.array([np.full(len(rows), np.nan) if place is None else rows[:, place] for place in places])
 
 
 def as_json(answer: dict[str, Any]) -> str:
