@@ -18,7 +18,7 @@ from .places import misfit
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.training',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
-            'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
+            'convert': 'abs_hil.interchange.recorded', 'watch': 'abs_hil.watch.program',
             'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
             'lab': 'abs_hil.lab.page', 'log': 'abs_hil.log', 'rig': 'abs_hil.rig', 'compare_tables': 'abs_hil.compare',
             'python_host': 'abs_hil.interchange.host'}

@@ -15,7 +15,7 @@ import pytest
 from conftest import ABS_HIL
 
 import abs_hil
-from abs_hil.interchange import program, recorded, running
+from abs_hil.interchange import recorded, running
 from abs_hil.interchange.messages import McapFile, field_names
 from abs_hil.run import COLUMNS
 
@@ -33,7 +33,7 @@ def folder(tmp_path_factory):
 
 
 def converted(origin, tmp_path, name='run.mcap'):
-    assert program.main([str(origin), str(tmp_path / name)]) == 0
+    assert recorded.main([str(origin), str(tmp_path / name)]) == 0
     return tmp_path / name
 
 
@@ -175,7 +175,7 @@ def test_events_that_a_log_lacks_are_counted(folder, tmp_path, capsys, change):
 def test_impossible_times_and_numbers_are_refused_with_their_place(folder, tmp_path, capsys):
     def refusal(origin):
         for name in ('run.mcap', 'run.parquet'):
-            assert program.main([str(origin), str(tmp_path / name)]) == 2 and not (tmp_path / name).exists()
+            assert recorded.main([str(origin), str(tmp_path / name)]) == 2 and not (tmp_path / name).exists()
         return capsys.readouterr().err
     log, at = tmp_path / 'run.lcmlog', {'TELEMETRY': 32, 'EVENT': 24}  # of time_s
     for channel, place in (('TELEMETRY', 'message 101 of its telemetry'), ('EVENT', 'event 2')):
@@ -227,7 +227,7 @@ def test_killed_conversion_leaves_no_file(folder, tmp_path):
     """Killed at several places, the conversion leaves the old file or none."""
     out = tmp_path / 'run.mcap'
     script = ('import os, signal, sys, abs_hil.interchange.messages as m\n'
-              'from abs_hil.interchange import program\n'
+              'from abs_hil.interchange import recorded\n'
               'calls = 0\n'
               'write = m.McapFile.{method}\n'
               'def die(*args, **kwargs):\n'
@@ -236,7 +236,7 @@ def test_killed_conversion_leaves_no_file(folder, tmp_path):
               '    if calls > {after}: os.kill(os.getpid(), signal.SIGKILL)\n'
               '    return write(*args, **kwargs)\n'
               'm.McapFile.{method} = die\n'
-              'program.main(sys.argv[1:])\n')
+              'recorded.main(sys.argv[1:])\n')
     for method, after in (('write', 0), ('write', 1500), ('describe', 0), ('finish', 0)):
         for before in (None, b'the old one'):
             out.unlink(missing_ok=True)
@@ -256,7 +256,7 @@ def test_killed_conversion_leaves_no_file(folder, tmp_path):
     (['--live', 'nonsense', 'out.mcap'], 'nonsense')])
 def test_bad_input(folder, tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
-    assert program.main([argument.replace('{run}', str(folder)) for argument in arguments]) == 2
+    assert recorded.main([argument.replace('{run}', str(folder)) for argument in arguments]) == 2
     said = capsys.readouterr().err
     assert words in said and len(said.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir())
@@ -264,7 +264,7 @@ def test_bad_input(folder, tmp_path, monkeypatch, capsys, arguments, words):
 
 LIVE = '''
 import subprocess, sys, threading
-from abs_hil.interchange import program, running
+from abs_hil.interchange import recorded, running
 receive = running.received
 def received(*arguments):
     # A run of 2 s, which begins when its receiver is there.
@@ -272,7 +272,7 @@ def received(*arguments):
                                            'experiment.start_speed_rad_s=150']]).start()
     return receive(*arguments)
 running.received = received
-sys.exit(program.main(['--live', '', '--idle', '1', '--seconds', '60', sys.argv[3]]))
+sys.exit(recorded.main(['--live', '', '--idle', '1', '--seconds', '60', sys.argv[3]]))
 '''
 
 

@@ -16,7 +16,7 @@ from conftest import ABS_HIL
 import abs_hil
 from abs_hil import log as log_program
 from abs_hil.identification.logs import load_log
-from abs_hil.interchange import program as convert_program
+from abs_hil.interchange import recorded as convert_program
 from abs_hil.report import program as report_program
 from abs_hil.run import COLUMNS
 from abs_hil.serve.feed import Feed, Played

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 import abs_hil
-from abs_hil.interchange import program
+from abs_hil.interchange import recorded
 
 QUICK = ('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60')
 
@@ -30,7 +30,7 @@ def cycle(number):
 
 def converted(tmp_path, log, status=0):
     (tmp_path / 'x.lcmlog').write_bytes(log)
-    assert program.main([str(tmp_path / 'x.lcmlog'), str(tmp_path / 'made.csv')]) == status
+    assert recorded.main([str(tmp_path / 'x.lcmlog'), str(tmp_path / 'made.csv')]) == status
     return {path.name: path.read_text().splitlines() for path in tmp_path.glob('made*')}
 
 
@@ -99,7 +99,7 @@ def test_a_damaged_log_is_converted_up_to_its_cut_or_leaves_the_older_file(tmp_p
         for damaged in (whole[:place], whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1:]):
             (tmp_path / 'x.lcmlog').write_bytes(damaged)
             (folder / 'made.csv').write_text('older')
-            statuses.append(program.main([str(tmp_path / 'x.lcmlog'), str(folder / 'made.csv')]))
+            statuses.append(recorded.main([str(tmp_path / 'x.lcmlog'), str(folder / 'made.csv')]))
             names = [path.name for path in folder.iterdir()]
             if statuses[-1] == 0:
                 assert len((folder / 'made.csv').read_text().splitlines()) > 1
@@ -114,7 +114,7 @@ def test_a_damaged_log_is_converted_up_to_its_cut_or_leaves_the_older_file(tmp_p
 def test_a_full_disk_leaves_the_older_file_and_is_status_1(tmp_path, abs_hil_program, most):
     abs_hil_program(*QUICK, '--log', tmp_path / 'run.lcmlog')
     (tmp_path / 'made.csv').write_text('older')
-    code = 'import sys; from abs_hil.interchange import program; sys.exit(program.main(sys.argv[1:]))'
+    code = 'import sys; from abs_hil.interchange import recorded; sys.exit(recorded.main(sys.argv[1:]))'
     done = subprocess.run([sys.executable, '-c', code, tmp_path / 'run.lcmlog', tmp_path / 'made.csv'], capture_output=True,
                           text=True, env=dict(os.environ),
                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
@@ -129,7 +129,7 @@ def test_what_the_command_reads_is_not_replaced(tmp_path, abs_hil_program, capsy
     run = tmp_path / 'run'
     for origin, out in ((run, run / 'run.csv'), (run / 'run.csv', run / 'run.csv'), (run, tmp_path / 'no' / 'x.csv'),
                         (run, tmp_path / 'x.txt')):
-        assert program.main([str(origin), str(out)]) == 2
+        assert recorded.main([str(origin), str(out)]) == 2
         assert str(out) in capsys.readouterr().err
     assert {path: path.read_bytes() for path in (tmp_path / 'run').iterdir()} == before
     assert not pathlib.Path(tmp_path / 'no').exists()

@@ -1,21 +1,29 @@
-"""Recorded runs: their rows with everything that stands beside them and what is missing, converted for other tools."""
+"""abs_convert: runs as files for other tools, with everything that stands beside their rows and what is missing; `abs_hil convert`
+starts it."""
 import datetime
+import errno
 import json
 import os
 import pathlib
+import signal
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from .. import parsers
 from ..core import _core
 from ..files import parse_json, write_whole
 from ..messages import PHASES, QUANTITIES, decode
+from ..options import failed
 from ..recording import FROM_LOG, LOG, kind_of, load, named, read_events, read_log
 from ..rows import check_times
 from ..run import COLUMNS, Run, csv_bytes
 from .messages import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC, McapFile
 
+TARGETS = ('.csv', '.mcap', '.parquet')
+#: reasons for which a file cannot be written that are not the command's fault
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 CYCLE_TYPE, SIGNALS_TYPE = 'abs_hil/msg/Cycle', 'abs_hil/msg/Signals'
 #: kinds of events and their levels in a log
 LEVELS = {'phase': 20, 'command': 20, 'limit': 30, 'fault': 40}
@@ -186,3 +194,63 @@ def _write(files: list[tuple[pathlib.Path, dict[str, np.ndarray]]]) -> None:
         if others:
             _write(others)
     write_whole(path, write)
+
+
+def main(arguments: list[str]) -> int:
+    given = parsers.convert().parse_args(arguments)
+    *inputs, out = [*given.files, *filter(None, [given.out])] or ['']
+    output = pathlib.Path(out)
+    try:
+        if output.suffix not in TARGETS:
+            raise ValueError(f'OUT = {out or "nothing"}: give a name that ends in .csv, .mcap or .parquet')
+        if len(inputs) != (given.live is None):
+            raise ValueError('give one IN, or --live URL in its place')
+        if not output.parent.is_dir():
+            raise ValueError(f'OUT = {output}: there is no folder {output.parent}; create it first')
+        if given.live is None and (given.idle is not None or given.seconds is not None):
+            raise ValueError('--idle and --seconds belong to --live')
+        if given.live is not None and output.suffix != '.mcap':
+            raise ValueError('--live writes .mcap only; convert that run\'s folder or log to .parquet afterwards')
+        print(_record(given, output) if given.live is not None else _convert(inputs[0], output))
+        return 0
+    except (ValueError, OSError) as error:
+        full = isinstance(error.__context__, OSError) and error.__context__.errno in FULL
+        return failed('abs_convert', error, 1 if full else 3 if isinstance(error, OSError) else 2)
+
+
+def _convert(path: str, output: pathlib.Path) -> str:
+    origin = named(path)[0].resolve()
+    if output.resolve() == origin or origin.is_dir() and output.resolve().parent == origin:
+        raise ValueError(f'OUT = {output}: this command reads it; give another file')
+    run, more = read(path), ''
+    if output.suffix == '.csv':
+        more = to_csv(run, path, output)
+    else:
+        write = to_mcap if output.suffix == '.mcap' else to_parquet
+        write_whole(output, lambda name: write(run, name))
+    return f'{len(run)} rows, {len(run.events)} events{more}; lost: {"; ".join(run.losses) or "nothing"}'
+
+
+def _record(given: Any, output: pathlib.Path) -> str:
+    from . import running
+    # A request to end must not cut the file short.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    result = ''
+
+    def record(name: str) -> None:
+        nonlocal result
+        with open(name, 'wb') as file:
+            recorder = running.Recorder(McapFile(file, library='abs_hil'))
+            try:
+                for channel, message in running.received(given.live, given.prefix, given.idle, given.seconds):
+                    recorder.take(channel, message)
+            except KeyboardInterrupt:
+                pass
+            recorder.finish()
+            if recorder.rows == 0:
+                raise ValueError(f'no telemetry of abs_hil came on {given.live or "the default network"}; `abs_hil doctor --only '
+                                 'lcm` says whether this computer can receive it')
+        result = (f'{recorder.rows} rows; lost: {recorder.lost} messages on the way, {recorder.damaged} damaged')
+
+    write_whole(output, record)
+    return result

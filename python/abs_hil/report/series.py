@@ -108,11 +108,11 @@ def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys
             continue
         panel = Panel(Label.plain(label), height_px=130.0)
         if means:
-            panel.curves.append(Curve(0, f'mean of {key}', Style('#000000', (), 1.2), np.array([m[0] for m in means]),
-                                      np.array([m[1] for m in means]), 'intervals', legend='mean, 95 % interval',
-                                      group='means', bounds=[(m[2], m[3]) for m in means]))
-        panel.curves.append(Curve(0, key, Style('#0072B2', (), 1.0), np.array([x for x, _ in every]),
-                                  np.array([y for _, y in every]), 'markers', 'open circle', 'runs', 'runs'))
+            x, y, low, high = np.array(means).T
+            panel.curves.append(Curve(0, f'mean of {key}', Style('#000000', (), 1.2), x, y, 'intervals', group='means',
+                                      legend='mean, 95 % interval', bounds=list(zip(low, high))))
+        x, y = np.array(every).T
+        panel.curves.append(Curve(0, key, Style('#0072B2', (), 1.0), x, y, 'markers', 'open circle', 'runs', 'runs'))
         if not found.by_value and len(found.groups) <= MOST_TICS:
             panel.x_tics = [(place, str(n)) for n, place in enumerate(places, 1)]
         panels.append(panel)

@@ -71,13 +71,11 @@ class Survey:
 
 def survey(run: RunFiles, rows: Run) -> Survey:
     time, braking = rows.columns['time_s'], rows.columns['phase'] == 'brake'
-    found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
-    found.r2_m = r2_m(run.config)
+    found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated, r2_m=r2_m(run.config))
     kinds = rows.columns['phase']
     names = rows.columns.get('phase_name', kinds)
     starts = np.flatnonzero(np.append(True, (kinds[1:] != kinds[:-1]) | (names[1:] != names[:-1])))
-    for number, start in enumerate(starts[:MOST_PHASES]):
-        end = starts[number + 1] if number + 1 < len(starts) else len(time) - 1
+    for start, end in zip(starts[:MOST_PHASES], [*starts[1:], len(time) - 1]):
         kind, name = kinds[start], names[start]
         found.phases.append(Phase(kind, float(time[start]), float(time[end]), '' if name == kind else name))
     if len(starts) > MOST_PHASES:

@@ -1,4 +1,5 @@
 """Histograms of the cycle's timing."""
+import itertools
 import math
 
 import numpy as np
@@ -30,11 +31,11 @@ def outline(counts: np.ndarray, total: float, floor: float) -> tuple[np.ndarray,
 
 def timing_figure(runs: list[RunFiles]) -> Figure | None:
     """None if no run has a histogram."""
-    timed = [number for number, run in enumerate(runs) if run.histogram is not None][:STYLES]
-    if not timed:
+    timed = ((number, run.histogram) for number, run in enumerate(runs) if run.histogram is not None)
+    histograms = dict(itertools.islice(timed, STYLES))
+    if not histograms:
         return None
-    histograms = {number: runs[number].histogram for number in timed}
-    columns = [counts for histogram in histograms.values() if histogram for counts in histogram.counts]
+    columns = [counts for histogram in histograms.values() for counts in histogram.counts]
     greatest = max([1.0, *(float(counts.sum()) for counts in columns)])
     last_us = max([10, *(len(counts) for counts in columns)])
     floor = 10.0 ** math.floor(math.log10(0.9 / greatest))
@@ -43,7 +44,6 @@ def timing_figure(runs: list[RunFiles]) -> Figure | None:
     for part, name in enumerate(PARTS):
         panel = Panel(Label.plain('share'), y_range=(floor, 1.0), height_px=105.0, log=True)
         for number, histogram in histograms.items():
-            assert histogram is not None
             overflows += histogram.overflows[part]
             total = float(histogram.counts[part].sum())
             if total > 0.0:
