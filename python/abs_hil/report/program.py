@@ -82,7 +82,7 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
     pairs = paper.pairs_of(runs, surveys) if of_paper else {}
     parts = {'title': clean(title) or _title(found, of_paper), 'version': _core.version,
              'lead': paper.lead(runs) if of_paper else _lead(runs), 'runs': len(runs), 'figures': figures, 'series': series,
-             'paper': {'claims': paper.claims(pairs), **pairs} if of_paper else None,
+             'paper': {'claims': paper.claims(pairs), 'less': f'{-paper.CLAIMED_PER_CENT:g} %', **pairs} if of_paper else None,
              'metrics': metrics, 'shared': shared, 'phases': tables.phases_table(runs, surveys), 'events': events,
              'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
              'timing_figure': timing, 'environment': tables.environment_table(runs),
