@@ -1,4 +1,5 @@
 """abs_hil.identify on rigs with a brake or tyre of their own: it finds what the plant has, and refuses the rest by name."""
+import dataclasses
 import pathlib
 import re
 import sys
@@ -9,11 +10,11 @@ import pytest
 
 import abs_hil
 from abs_hil.core import _core
-from abs_hil.identification import program, structure
+from abs_hil.identification import estimate, program, structure
 from abs_hil.identification.advice import information, log_of
 from abs_hil.identification.brake_flaws import leaky
 from abs_hil.identification.logs import motion_of
-from abs_hil.identification.results import as_toml
+from abs_hil.identification.results import as_json, as_toml
 from abs_hil.identification.slots import middles, slots_of
 from abs_hil.options import options
 
@@ -222,16 +223,29 @@ def test_what_the_plant_lacks_is_named_with_a_phase_in_which_it_acts_and_without
     assert not any('lifted' in note and 'run' in note for note in found.notes[1:])
 
 
-def test_a_cause_that_was_tried_or_leaves_others_is_not_stated(monkeypatch):
+def test_a_cause_is_named_only_if_it_suffices_without_a_rival_and_in_left_out_logs(monkeypatch):
     monkeypatch.setattr(structure, '_where', lambda *_: ('locked', 'brake'))
     causes = {cause.words: cause for cause in structure.CAUSES}
     falls, acts_late, by_speed = (causes[words] for words in (
         'the friction falls with the sliding speed', 'the brake acts late', "the friction changes with the lower wheel's speed"))
-    said = structure.sentence([structure.Found(falls, 0.02, 31.0, 1.0), structure.Found(acts_late, 1e-3, 12.0, 1.0)], None)
-    assert 'the cause is none that it has: it is most as if the friction falls with the sliding speed (0.02 per m/s, 31' in said
-    assert 'plant.friction_fall_s_m, plant.brake_dead_time_s: tried, and no explanation' in said
-    rises = structure.Found(falls, -0.02, 31.0, 1.0)  # the plant cannot have that: nothing was tried
-    assert 'plant: the friction rises' in structure.sentence([rises], None)
-    for words, beside in (('as if the friction changes', 20.0), ('plant: the friction changes', 3.0)):
-        late = structure.Found(acts_late, 1e-3, beside, 1.0)
-        assert words in structure.sentence([structure.Found(by_speed, 0.02, 31.0, 1.0, late)], None)
+
+    def surest(cause, coefficient=0.02, **more):
+        return structure.Found(cause, coefficient, 31.0, 1.0, **{'together': 1.1 * 31.0**2, 'foretold': True, **more})
+    beside = structure.Found(acts_late, 1e-3, 12.0, 1.0)
+    assert structure.named([surest(by_speed), beside])
+    assert not structure.named([surest(by_speed, foretold=False), beside])
+    assert not structure.named([surest(by_speed, together=1.2 * 31.0**2), beside])
+    assert not structure.named([surest(by_speed), dataclasses.replace(beside, sure=23.0)])
+    assert not structure.named([surest(falls), beside])  # the plant has that: it was tried
+    assert structure.named([surest(falls, -0.02), beside])  # it cannot have that
+    said = structure.sentence([surest(falls, -0.02)], None)
+    assert 'plant: the friction rises with the sliding speed (-0.02 per m/s, 31' in said
+
+
+def test_a_fit_that_is_not_at_rest_says_nothing_of_the_rig(monkeypatch):
+    """With causes enough, and with a residual that would do."""
+    logs = others(4, by_speed_s_m=0.01)
+    monkeypatch.setattr(estimate, 'RESTS', 0.0)
+    found = identify(logs)
+    assert re.match(r'the fit did not get there \(last step .* nothing is said of the rig. Most is left in [\w-]+', found.misfit)
+    assert found.refused and not [name for name, row in as_json(found)['parameters'].items() if row['status'] != 'fixed']
