@@ -13,12 +13,6 @@ FactorProgress over_time(const std::string& profile, const char* key) {
   return {FactorProfile(profile, key, FactorProfile::Axes::time_only), 1.0};
 }
 
-/// Changes of the duty on their way at most: those of the longest dead time at 10 kHz. Beyond them the newest replaces
-/// the one before.
-constexpr std::size_t changes_most = 2048;
-/// Rounding error of the sum of a run's intervals; a change that is due within it is due.
-constexpr double due_rounding_s = 1e-11;
-
 }  // namespace
 
 Drift::Drift(const DriftProfiles& profiles)
@@ -59,39 +53,47 @@ DriftFactors Drift::after(double time_s) const noexcept {
   return {factor(0), factor(1), factor(2), factor(3)};
 }
 
-BrakePath::BrakePath(const BrakeFlaws& flaws, double full_Nm, bool ideal_actuator)
-    : dead_time_s_(flaws.dead_time_s),
+BrakePath::BrakePath(const BrakeFlaws& flaws, const rig::BrakeParameters& brake, bool ideal_actuator)
+    : brake_(brake),
+      delay_(ideal_actuator ? rig::BrakeDelay() : rig::BrakeDelay(brake)),
       hysteresis_(ideal_actuator ? 0.0 : flaws.hysteresis),
       fading_per_J_(ideal_actuator ? 0.0 : flaws.fading_per_J),
       cooling_per_s_(flaws.cooling_per_s),
-      curvature_(ideal_actuator || !(full_Nm > 0.0) ? 0.0 : flaws.curvature),
-      full_Nm_(full_Nm),
+      curvature_(flaws.curvature),
+      full_Nm_(rig::brake_torque_at(brake, 1.0)),
       release_ratio_(ideal_actuator ? 1.0 : flaws.release_ratio),
-      changes_(!ideal_actuator && flaws.dead_time_s > 0.0 ? changes_most : 0) {}
+      overshoot_(ideal_actuator ? 0.0 : flaws.overshoot),
+      overshoot_per_s_(flaws.overshoot_per_s) {
+  if (ideal_actuator || !(full_Nm_ > 0.0)) curvature_ = 0.0;
+}
 
 void BrakePath::start() noexcept {
-  first_ = count_ = 0;
-  time_s_ = newest_ = duty_ = held_Nm_ = heat_J_ = 0.0;
+  delay_.start();
+  duty_ = engaged_ = held_Nm_ = heat_J_ = 0.0;
 }
 
 void BrakePath::command(double duty) noexcept {
-  if (!delays()) {
-    duty_ = duty;
-    return;
-  }
-  settle();
-  if (duty == newest_) return;
-  newest_ = duty;
-  if (count_ == changes_.size()) --count_;
-  changes_[(first_ + count_) % changes_.size()] = {time_s_ + dead_time_s_, duty};
-  ++count_;
+  if (delay_.any()) delay_.send(duty);
+  duty_ = delay_.any() ? delay_.duty() : duty;
 }
 
 double BrakePath::part_s(double left_s, double max_step_s) const noexcept {
-  double part_s = left_s;
-  if (count_ > 0) part_s = std::min(part_s, next().due_s - time_s_);
-  if (fades()) part_s = std::min(part_s, max_step_s);
-  return part_s;
+  const bool overshoots = overshoot_ > 0.0 && duty_ >= 1.0 && engaged_ < 1.0;
+  const double most_s = fades() || overshoots ? max_step_s : left_s;
+  return std::min({left_s, delay_.steady_s(), most_s});
+}
+
+double BrakePath::static_Nm(double part_s) const noexcept {
+  double torque_Nm = rig::brake_torque_at(brake_, duty_);
+  if (curvature_ != 0.0) torque_Nm *= 1.0 + curvature_ * (torque_Nm / full_Nm_ - 1.0);
+  // The overshoot acts as it is in the part's middle.
+  if (overshoot_ > 0.0 && duty_ >= 1.0) torque_Nm *= 1.0 + overshoot_ * (1.0 - engaged_after(0.5 * part_s));
+  return torque_Nm;
+}
+
+double BrakePath::engaged_after(double time_s) const noexcept {
+  const double to = duty_ >= brake_.u0 ? 1.0 : 0.0;
+  return engaged_ + (engaged_ - to) * rig::exponential_less_one(-overshoot_per_s_ * time_s);
 }
 
 double BrakePath::transmitted_Nm(double static_Nm, double part_s, double power_W) noexcept {
@@ -103,22 +105,17 @@ double BrakePath::transmitted_Nm(double static_Nm, double part_s, double power_W
 }
 
 void BrakePath::pass(double part_s, double energy_J) noexcept {
-  time_s_ += part_s;
   // The energy comes in in the part's middle.
   const double kept = 1.0 + cooled(part_s);
   heat_J_ = (heat_J_ * kept + energy_J) * kept;
-  settle();
+  if (overshoot_ > 0.0) engaged_ = engaged_after(part_s);
+  if (!delay_.any()) return;
+  delay_.pass(part_s);
+  duty_ = delay_.duty();
 }
 
 double BrakePath::cooled(double part_s) const noexcept {
   return rig::exponential_less_one(-0.5 * cooling_per_s_ * part_s);
-}
-
-void BrakePath::settle() noexcept {
-  for (; count_ > 0 && next().due_s <= time_s_ + due_rounding_s; --count_) {
-    duty_ = next().duty;
-    first_ = (first_ + 1) % changes_.size();
-  }
 }
 
 }  // namespace abs_hil::plant_sim

@@ -28,7 +28,7 @@ Plant::Plant(const PlantOptions& options)
       profile_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
       drift_(options.drift),
       model_(options, profile_.profile().highest()) {
-  brake_path_.emplace(options_.brake_flaws, rig::brake_torque_at(options_.rig.brake, 1.0), options_.ideal_actuator);
+  brake_path_.emplace(options_.brake_flaws, options_.rig.brake, options_.ideal_actuator);
   if (!brake_path_->any()) brake_path_.reset();
   let_bearings_drift(drift_.after(0.0));
 }
@@ -79,7 +79,7 @@ void Plant::let_bearings_drift(const DriftFactors& factors) noexcept {
 
 void Plant::advance(double duration_s, const PlantInput& input) noexcept {
   if (!(duration_s > 0.0)) return;
-  const HeldTorques held = resolve(options_, input);
+  const HeldTorques held = resolve(options_, input, state_.omega2_rad_s);
   if (held.brake_target_Nm > 0.0) {
     profile_.brake_applied(state_.angle2_rad);
     drift_.brake_applied();
@@ -90,24 +90,29 @@ void Plant::advance(double duration_s, const PlantInput& input) noexcept {
     if (options_.ideal_actuator) x[brake_torque] = torques.brake_target_Nm;
     integrate(model_, options_.max_step_s, torques, part_s, profile_, x);
   };
-  if (drift_.any() || brake_path_) {
-    advance_in_parts(held, duration_s, x, go_on);
+  if (drift_.any() || brake_path_ || switches_resistors()) {
+    advance_in_parts(held, duration_s, input, x, go_on);
   } else {
     go_on(held, duration_s);
   }
   state_ = state_of(x);
 }
 
-/// Each part uses the drifting factors at its middle.
+/// Each part uses the drifting factors at its middle, and the start resistors at its start.
 template <class Torques, class State, class GoOn>
-void Plant::advance_in_parts(const Torques& held, double duration_s, const State& x, const GoOn& go_on) noexcept {
+void Plant::advance_in_parts(const Torques& held, double duration_s, const PlantInput& input, const State& x,
+                             const GoOn& go_on) noexcept {
   const auto brake_power_W = [&x] { return x[brake_torque] * std::abs(x[omega1]); };
   for (double left_s = duration_s; left_s > 0.0;) {
     double part_s = drift_.any() ? drift_.part_s(left_s, options_.max_step_s) : left_s;
     HeldTorques now = held;
+    if (switches_resistors() && input.motor_duty > 0.0) {
+      part_s = std::min(part_s, options_.max_step_s);
+      set_motor(now, options_.rig.motor, input.motor_duty, x[omega2]);
+    }
     if (brake_path_) {
       part_s = brake_path_->part_s(part_s, options_.max_step_s);
-      now.brake_target_Nm = brake_path_->curved_Nm(rig::brake_torque_at(options_.rig.brake, brake_path_->duty()));
+      now.brake_target_Nm = brake_path_->static_Nm(part_s);
     }
     if (drift_.any()) {
       const DriftFactors factors = drift_.after(0.5 * part_s);
@@ -132,9 +137,9 @@ double Plant::slip() const noexcept { return model_.slip(state_.omega1_rad_s, st
 ContactState Plant::contact() const noexcept {
   const StateVector x = vector_of(state_);
   const PresentFactor friction = profile_.present(state_.angle2_rad);
-  const HeldTorques no_inputs{};
+  const HeldTorques no_inputs = resolve(options_, {});
   const Sliding sliding = sliding_from({model_, no_inputs, friction, {}}, x);
-  return {state_.omega1_rad_s, state_.omega2_rad_s, state_.brake_torque_Nm, sliding.upper, friction.value};
+  return {state_.omega1_rad_s, state_.omega2_rad_s, acting_brake_Nm(no_inputs, x), sliding.upper, friction.value};
 }
 
 double Plant::tyre_force_N() const noexcept { return model_.tyre_force_N(contact()); }
@@ -142,7 +147,8 @@ double Plant::tyre_force_N() const noexcept { return model_.tyre_force_N(contact
 double Plant::friction() const noexcept { return profile_.present(state_.angle2_rad).value; }
 
 rig::PlantTruth Plant::truth() const noexcept {
-  return {{state_.omega1_rad_s, state_.omega2_rad_s}, slip(), state_.brake_torque_Nm, model_.peak_force_N(contact())};
+  const ContactState now = contact();
+  return {{now.omega1_rad_s, now.omega2_rad_s}, slip(), now.brake_torque_Nm, model_.peak_force_N(now)};
 }
 
 }  // namespace abs_hil::plant_sim

@@ -20,8 +20,8 @@ double pull_on_lower_Nm(const WheelModel& model, const HeldTorques& held, double
 }
 
 /// Largest friction torque on the standing upper wheel, N m: bearing and brake.
-double hold_of_upper_Nm(const WheelModel& model, const StateVector& x) noexcept {
-  return model.wheels().M10_Nm + x[brake_torque];
+double hold_of_upper_Nm(const TorqueBalance& balance, const StateVector& x) noexcept {
+  return balance.model.wheels().M10_Nm + acting_brake_Nm(balance.held, x);
 }
 
 double direction(double speed_rad_s, double pull_Nm, double hold_Nm) noexcept {
@@ -40,7 +40,8 @@ double fastest_rate_per_s(const TorqueBalance& balance, const StateVector& x) no
   const Sliding& sliding = balance.sliding;
   const double mobility_per_kg =
       (sliding.upper != 0.0 ? w.r1_m * w.r1_per_J1 : 0.0) + (sliding.lower != 0.0 ? w.r2_m * w.r2_per_J2 : 0.0);
-  const ContactState steepest{x[omega1], x[omega2], x[brake_torque], sliding.upper, balance.friction.highest};
+  const ContactState steepest{x[omega1], x[omega2], acting_brake_Nm(balance.held, x), sliding.upper,
+                              balance.friction.highest};
   return balance.model.damping_bound_Ns_m(steepest) * mobility_per_kg;
 }
 
@@ -168,7 +169,7 @@ Sliding sliding_from(TorqueBalance balance, const StateVector& x) noexcept {
   if (x[omega1] != 0.0 && x[omega2] != 0.0) return balance.sliding;
   const WheelModel& model = balance.model;
   const double force_N = balance.tyre_force_N(x, 0.0);
-  return {direction(x[omega1], pull_on_upper_Nm(model, force_N), hold_of_upper_Nm(model, x)),
+  return {direction(x[omega1], pull_on_upper_Nm(model, force_N), hold_of_upper_Nm(balance, x)),
           direction(x[omega2], pull_on_lower_Nm(model, balance.held, force_N), model.wheels().M20_Nm)};
 }
 
@@ -181,7 +182,7 @@ double margin(const TorqueBalance& balance, const StateVector& x, double time_s)
   }
   const double force_N = balance.tyre_force_N(x, time_s);
   const double upper = sliding.upper != 0.0 ? sliding.upper * x[omega1]
-                                            : hold_of_upper_Nm(model, x) - std::abs(pull_on_upper_Nm(model, force_N));
+                                            : hold_of_upper_Nm(balance, x) - std::abs(pull_on_upper_Nm(model, force_N));
   const double lower = sliding.lower != 0.0
                            ? sliding.lower * x[omega2]
                            : model.wheels().M20_Nm - std::abs(pull_on_lower_Nm(model, balance.held, force_N));

@@ -1,9 +1,18 @@
-// The right-hand side of the wheels' and the brake's differential equations (1), (2) and (6).
+// The right-hand side of the wheels' and the brake's differential equations (1), (2) and (6):
+//
+//   J1 omega1' = r1 F - d1 omega1 - s1 (M10 + M),   J2 omega2' = -r2 F - d2 omega2 - s2 M20 + A u (1 - omega2 / w0)
+//   Tb' = c31 (b - Tb), within the limit of the rate;   M = Tb + R cos(theta1 + phase) min(Tb / 3 N m, 1)
+//
+// F is the tyre force, u the motor's duty, A its stall torque, w0 its no-load speed, b the target of the brake torque
+// Tb, M the torque that acts on the wheel, R the ripple.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <type_traits>
 
 #include "abs_hil/plant_sim/plant.hpp"
@@ -86,10 +95,20 @@ struct BasicHeldTorques {
   S brake_limit_Nm_s{std::numeric_limits<double>::infinity()};  ///< of the torque's rate
   S motor_stall_Nm{0.0};                                        ///< motor torque at standstill
   S motor_back_emf_Nms{0.0};  ///< decrease of the motor torque per rad/s of the lower wheel
+  double ripple_Nm{0.0};      ///< of the brake torque over the upper wheel's angle; lanes have none
+  double ripple_phase_rad{0.0};
 };
 using HeldTorques = BasicHeldTorques<double>;
 
-[[nodiscard]] inline HeldTorques resolve(const PlantOptions& options, const PlantInput& input) noexcept {
+/// @param omega2_rad_s  decides which start resistors are in the motor's circuit
+inline void set_motor(HeldTorques& held, const rig::DriveMotorParameters& motor, double duty,
+                      double omega2_rad_s) noexcept {
+  held.motor_stall_Nm = rig::stall_torque_Nm(motor, omega2_rad_s) * duty;
+  held.motor_back_emf_Nms = held.motor_stall_Nm / motor.no_load_speed_rad_s;
+}
+
+[[nodiscard]] inline HeldTorques resolve(const PlantOptions& options, const PlantInput& input,
+                                         double omega2_rad_s = 0.0) noexcept {
   const rig::RigParameters& rig = options.rig;
   HeldTorques held;
   if (options.ideal_actuator) {
@@ -98,9 +117,10 @@ using HeldTorques = BasicHeldTorques<double>;
     held.brake_target_Nm = rig::brake_torque_at(rig.brake, input.brake_duty);
     held.brake_rate_per_s = rig.brake.c31_per_s;
     if (rig.brake.brake_rate_limit_Nm_s > 0.0) held.brake_limit_Nm_s = rig.brake.brake_rate_limit_Nm_s;
+    held.ripple_Nm = options.brake_flaws.ripple_Nm;
+    held.ripple_phase_rad = options.brake_flaws.ripple_phase_rad;
   }
-  held.motor_stall_Nm = rig.motor.stall_torque_Nm * input.motor_duty;
-  held.motor_back_emf_Nms = held.motor_stall_Nm / rig.motor.no_load_speed_rad_s;
+  set_motor(held, rig.motor, input.motor_duty, omega2_rad_s);
   return held;
 }
 
@@ -113,6 +133,19 @@ struct BrakeAlone {
 template <class S>
 [[nodiscard]] inline S motor_torque_Nm(const BrakeAlone<S>& /*held*/, const S& /*omega2_rad_s*/) noexcept {
   return S(0.0);
+}
+
+/// Torque of the brake that acts on the upper wheel, N m, >= 0.
+template <class Held, class S>
+[[nodiscard]] inline S acting_brake_Nm(const Held& held, const BasicState<S>& x) noexcept {
+  if constexpr (std::is_same_v<Held, HeldTorques>) {
+    if (held.ripple_Nm > 0.0) [[unlikely]] {
+      const double angle_rad = std::remainder(x[angle1] + held.ripple_phase_rad, 2.0 * std::numbers::pi);
+      const double share = std::min(1.0, x[brake_torque] / BrakeFlaws::rippled_fully_Nm);
+      return x[brake_torque] + share * held.ripple_Nm * rig::cosine(angle_rad);
+    }
+  }
+  return x[brake_torque];
 }
 
 /// Torque of the drive motor on the lower wheel, N m; exactly 0 at duty 0.
@@ -139,7 +172,7 @@ template <class S, class Held, class Upper, class Lower>
                                                                 const S& force_N, Upper upper, Lower lower,
                                                                 const BasicState<S>& x) noexcept {
   BasicState<S> rates;
-  rates[omega1] = wheels.upper_rate_rad_s2(force_N, x[brake_torque], x[omega1], upper);
+  rates[omega1] = wheels.upper_rate_rad_s2(force_N, acting_brake_Nm(held, x), x[omega1], upper);
   rates[omega2] = wheels.lower_rate_rad_s2(force_N, motor_torque_Nm(held, x[omega2]), x[omega2], lower);
   rates[brake_torque] = brake_rate_Nm_s(held, x[brake_torque]);
   rates[angle1] = x[omega1];
@@ -159,7 +192,7 @@ struct TorqueBalance {
   /// @param time_s  time since `friction` holds
   [[nodiscard]] double tyre_force_N(const StateVector& x, double time_s) const noexcept {
     return model.tyre_force_N(
-        {x[omega1], x[omega2], x[brake_torque], sliding.upper, friction.after(time_s, x[angle2])});
+        {x[omega1], x[omega2], acting_brake_Nm(held, x), sliding.upper, friction.after(time_s, x[angle2])});
   }
 
   [[nodiscard]] StateVector operator()(const StateVector& x, double time_s) const noexcept {
@@ -182,7 +215,7 @@ struct RollingBalance {
   const S& friction;
 
   [[nodiscard]] UpperWheelTorques<S, Upper> upper_torques(const BasicState<S>& x) const noexcept {
-    return {{}, wheels.M10_Nm + x[brake_torque], wheels.d1_Nms_rad * x[omega1]};
+    return {{}, wheels.M10_Nm + acting_brake_Nm(held, x), wheels.d1_Nms_rad * x[omega1]};
   }
   [[nodiscard, gnu::always_inline]] BasicState<S> operator()(const BasicState<S>& x,
                                                              const S& /*time_s*/) const noexcept {
@@ -205,7 +238,7 @@ struct RollingBalance {
   [[nodiscard]] auto holds_upper(const BasicState<S>& x) const noexcept
     requires std::is_same_v<Upper, Held>
   {
-    return rig::magnitude(S(wheels.r1_m * force_N(x))) <= wheels.M10_Nm + x[brake_torque];
+    return rig::magnitude(S(wheels.r1_m * force_N(x))) <= wheels.M10_Nm + acting_brake_Nm(held, x);
   }
 
  private:

@@ -103,3 +103,32 @@ TEST_CASE("The truth is the plant's state") {
   CHECK_THAT(truth.slip, WithinRel((9.9 - 7.96) / 9.9, 1e-14));
   CHECK_THAT(plant.tyre_force_N(), WithinRel(23.0 * std::sin(1.68 * std::atan(28.0 * truth.slip)), 1e-14));
 }
+
+TEST_CASE("Start resistors leave the motor less torque until the lower wheel's speed bridges them") {
+  PlantOptions options = wheels_apart();
+  abs_hil::rig::DriveMotorParameters& motor = options.rig.motor;
+  motor = {.stall_torque_Nm = 2.7,
+           .no_load_speed_rad_s = 488.0,
+           .start_torque_Nm = 0.97,
+           .start_until_rad_s = 60.0,
+           .middle_torque_Nm = 1.5,
+           .middle_until_rad_s = 105.0};
+  const auto& w = options.rig.wheels;
+  // J w' = A - M - (A / w0 + d) w from one speed to the next, under the stall torque A.
+  const auto time_s = [&](double A, double from, double to) {
+    const double damping = A / motor.no_load_speed_rad_s + w.d2_Nms_rad;
+    const double final_rad_s = (A - w.M20_Nm) / damping;
+    return w.J2_kg_m2 / damping * std::log((final_rad_s - from) / (final_rad_s - to));
+  };
+  const double duration_s = time_s(0.97, 0.0, 60.0) + time_s(1.5, 60.0, 105.0) + time_s(2.7, 105.0, 178.0);
+  Plant plant(options);
+  const double tick_s = GENERATE(1e-3, 0.02, 5.0);  // a resistor is bridged within a tick, too
+  double left_s = duration_s;
+  for (; left_s > tick_s; left_s -= tick_s) plant.advance(tick_s, {.motor_duty = 1.0});
+  plant.advance(left_s, {.motor_duty = 1.0});
+  CHECK_THAT(plant.state().omega2_rad_s, WithinAbs(178.0, 0.03));  // the step in which the torque jumps
+  plant.reset({.omega2_rad_s = 100.0});
+  plant.advance(1e-4, {.motor_duty = 0.5});
+  const double driven_Nm = 0.5 * 1.5 * (1.0 - 100.0 / 488.0) - w.M20_Nm - w.d2_Nms_rad * 100.0;
+  CHECK_THAT(plant.state().omega2_rad_s - 100.0, WithinRel(1e-4 * driven_Nm / w.J2_kg_m2, 1e-3));
+}

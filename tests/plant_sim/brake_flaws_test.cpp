@@ -95,7 +95,7 @@ TEST_CASE("After a dead time the torque is that of a brake without one, shifted 
   PlantOptions options = endless_wheel();
   Plant prompt(options);
   const double dead_s = GENERATE(2e-3, 3.7e-3, 0.0203);
-  options.brake_flaws.dead_time_s = dead_s;
+  options.rig.brake.brake_dead_time_s = dead_s;
   Plant late(options);
   prompt.reset(rolling_at_170);
   late.reset(rolling_at_170);
@@ -118,7 +118,7 @@ TEST_CASE("After a dead time the torque is that of a brake without one, shifted 
 
 TEST_CASE("A dead time ends within a tick, however long the tick is") {
   PlantOptions options = endless_wheel();
-  options.brake_flaws.dead_time_s = 0.1;
+  options.rig.brake.brake_dead_time_s = 0.1;
   Plant plant(options);
   plant.reset(rolling_at_170);
   plant.advance(0.35, {.brake_duty = 0.8});
@@ -201,7 +201,7 @@ TEST_CASE("A brake lets go at a rate of its own, within the limit of its rate an
   const double ratio = GENERATE(0.5, 1.0, 1.8);
   options.brake_flaws.release_ratio = ratio;
   const double dead_s = GENERATE(0.0, 0.0123);
-  options.brake_flaws.dead_time_s = dead_s;
+  options.rig.brake.brake_dead_time_s = dead_s;
   const double c = options.rig.brake.c31_per_s;
   const double high_Nm = static_Nm(options, 0.8);
   const double low_Nm = static_Nm(options, 0.5);
@@ -212,6 +212,76 @@ TEST_CASE("A brake lets go at a rate of its own, within the limit of its rate an
   const double held_Nm = torque_after(plant, 3.0, 1e-3, 0.8);
   const double fallen_Nm = torque_after(plant, 0.04, 1e-3, 0.5);
   CHECK_THAT(fallen_Nm, WithinRel(low_Nm + (held_Nm - low_Nm) * std::exp(-ratio * c * (0.04 - dead_s)), 1e-9));
+}
+
+TEST_CASE("A brake that lets go sooner than it takes hold loses pulses shorter than the difference") {
+  PlantOptions options = endless_wheel();
+  options.rig.brake.brake_dead_time_s = 0.0129;
+  options.rig.brake.brake_release_lead_s = 0.0037;
+  const double c = options.rig.brake.c31_per_s;
+  const double b = static_Nm(options, 0.8);
+  Plant plant(options);
+  plant.reset(rolling_at_170);
+  static_cast<void>(torque_after(plant, 0.0036, 1e-3, 0.8));
+  CHECK(torque_after(plant, 0.05, 1e-3, 0.0) == 0.0);
+  // 30 ms of command brake for 30 - 3.7 ms: from 12.9 to 39.2 ms.
+  static_cast<void>(torque_after(plant, 0.03, 1e-3, 0.8));
+  CHECK_THAT(torque_after(plant, 0.0092, 1e-3, 0.0), WithinRel(b * (1.0 - std::exp(-c * 0.0263)), 1e-9));
+  CHECK_THAT(torque_after(plant, 0.02, 1e-3, 0.0),
+             WithinRel(b * (1.0 - std::exp(-c * 0.0263)) * std::exp(-c * 0.02), 1e-9));
+}
+
+TEST_CASE("At full duty the torque overshoots as the brake takes hold, and again after it was released for long") {
+  PlantOptions options = endless_wheel();
+  const double g = 0.74, r = 78.0, c = 340.0;
+  // The share that overshoots is held over a step: an error of (r h)^2.
+  options.max_step_s = 25e-6;
+  options.rig.brake.c31_per_s = c;
+  options.rig.brake.brake_dead_time_s = GENERATE(0.0, 0.0129);
+  options.brake_flaws.overshoot = g;
+  options.brake_flaws.overshoot_per_s = r;
+  const double dead_s = options.rig.brake.brake_dead_time_s;
+  const double b = static_Nm(options, 1.0);
+  // T' = c (b (1 + g s exp(-r t)) - T), T(0) = 0; s is what has come back of the overshoot.
+  const auto risen_Nm = [&](double t, double s) {
+    return b * (1.0 - std::exp(-c * t) + g * s * c / (c - r) * (std::exp(-r * t) - std::exp(-c * t)));
+  };
+  for (const double time_s : {0.004, 0.01, 0.04}) {
+    Plant plant(options);
+    plant.reset(rolling_at_170);
+    CHECK_THAT(torque_after(plant, dead_s + time_s, 1e-3, 1.0), WithinRel(risen_Nm(time_s, 1.0), 1e-6));
+  }
+  Plant plant(options);
+  plant.reset(rolling_at_170);
+  static_cast<void>(torque_after(plant, 1.0, 1e-3, 1.0));
+  static_cast<void>(torque_after(plant, 0.03, 1e-3, 0.0));
+  const double left_Nm = b * std::exp(-c * 0.03);
+  const double again_Nm = torque_after(plant, dead_s + 0.01, 1e-3, 1.0);
+  CHECK_THAT(again_Nm, WithinRel(risen_Nm(0.01, 1.0 - std::exp(-r * 0.03)) + left_Nm * std::exp(-c * 0.01), 1e-6));
+  plant.reset(rolling_at_170);
+  CHECK_THAT(torque_after(plant, dead_s + 0.01, 1e-3, 0.99),
+             WithinRel(static_Nm(options, 0.99) * (1.0 - std::exp(-c * 0.01)), 1e-9));  // none below full duty
+}
+
+TEST_CASE("The ripple of the brake's torque does the work of a cosine over the wheel's angle") {
+  PlantOptions options = wheels_apart();
+  options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
+  const double R = 1.6, phase = 0.7, J = options.rig.wheels.J1_kg_m2;
+  const double duty = GENERATE(0.8, 0.43);
+  options.brake_flaws.ripple_Nm = R;
+  options.brake_flaws.ripple_phase_rad = phase;
+  const double b = static_Nm(options, duty);
+  const double amplitude_Nm = R * std::min(b / 3.0, 1.0);
+  Plant plant(options);
+  plant.reset({.omega1_rad_s = 170.0, .omega2_rad_s = 170.0, .brake_torque_Nm = b});
+  for (int tick = 0; tick < 60; ++tick) {
+    plant.advance(1e-3, {.brake_duty = duty});
+    const PlantState& s = plant.state();
+    // J w^2 / 2 falls by the integral of b + A cos(angle + phase) over the angle.
+    const double work_J = b * s.angle1_rad + amplitude_Nm * (std::sin(s.angle1_rad + phase) - std::sin(phase));
+    REQUIRE_THAT(0.5 * J * s.omega1_rad_s * s.omega1_rad_s, WithinRel(0.5 * J * 170.0 * 170.0 - work_J, 1e-8));
+    REQUIRE_THAT(plant.truth().brake_torque_Nm, WithinAbs(b + amplitude_Nm * std::cos(s.angle1_rad + phase), 1e-9));
+  }
 }
 
 TEST_CASE("A curved map has the torque of the straight one at duty 1, and its share less near 0") {
@@ -230,7 +300,7 @@ TEST_CASE("A curved map has the torque of the straight one at duty 1, and its sh
 
 TEST_CASE("A copy of a plant has a brake of its own, with what is under way in it") {
   PlantOptions options = endless_wheel();
-  options.brake_flaws.dead_time_s = 0.05;
+  options.rig.brake.brake_dead_time_s = 0.05;
   Plant plant(options);
   plant.reset(rolling_at_170);
   plant.advance(0.03, {.brake_duty = 0.8});
@@ -250,12 +320,14 @@ TEST_CASE("An ideal actuator has no flaws") {
   PlantOptions options = endless_wheel();
   options.ideal_actuator = true;
   options.rig.brake.brake_rate_limit_Nm_s = 1.0;
-  options.brake_flaws = {.dead_time_s = 0.1,
-                         .hysteresis = 0.3,
+  options.rig.brake.brake_dead_time_s = 0.1;
+  options.brake_flaws = {.hysteresis = 0.3,
                          .fading_per_J = 0.01,
                          .cooling_per_s = 1.0,
                          .curvature = 0.5,
-                         .release_ratio = 3.0};
+                         .release_ratio = 3.0,
+                         .overshoot = 1.0,
+                         .ripple_Nm = 2.0};
   Plant plant(options);
   plant.reset(rolling_at_170);
   plant.advance(0.01, {.brake_torque_Nm = 3.0});
@@ -264,7 +336,7 @@ TEST_CASE("An ideal actuator has no flaws") {
 
 TEST_CASE("The flaws act together with a drifting brake") {
   PlantOptions options = endless_wheel();
-  options.brake_flaws.dead_time_s = 0.05;
+  options.rig.brake.brake_dead_time_s = 0.05;
   options.drift.brake_torque = "braking time: 1; 0.5 from 0 to 2";
   Plant plant(options);
   plant.reset(rolling_at_170);

@@ -56,13 +56,11 @@ struct DriftProfiles {
                  .meaning = "simulation: factor over M20 and d2, over time (docs/plants.md)");
 };
 
-/// What a real brake does beside its map and lag (docs/plants.md). Without effect on an ideal actuator.
+/// What a real brake does beside its map, dead times and lag (docs/plants.md). Without effect on an ideal actuator.
 struct BrakeFlaws {
   ABS_HIL_OPTIONS(BrakeFlaws);
   bool operator==(const BrakeFlaws&) const = default;
-  ABS_HIL_OPTION(double, dead_time_s, 0.0, .unit = "s",
-                 .meaning = "simulation: time after which the brake follows a change of its duty",
-                 .range = rig::from_zero(0.2));
+  static constexpr double rippled_fully_Nm = 3.0;
   ABS_HIL_OPTION(double, hysteresis, 0.0,
                  .meaning = "simulation: share of the torque by which a cable's friction keeps it from b(u)",
                  .range = rig::from_zero(0.5));
@@ -78,6 +76,20 @@ struct BrakeFlaws {
   ABS_HIL_OPTION(double, release_ratio, 1.0,
                  .meaning = "simulation: how many times faster the brake lets go than it takes hold",
                  .range = rig::between(0.1, 10));
+  /// Above 1 the gate's bounds, which have a factor of 2, would not cover it (docs/safety.md).
+  ABS_HIL_OPTION(double, overshoot, 0.0,
+                 .meaning = "simulation: share by which the torque at duty 1 is too large as the brake takes hold",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, overshoot_per_s, 78.0, .unit = "1/s",
+                 .meaning = "simulation: rate at which the overshoot fades, and comes back in a released brake",
+                 .range = rig::positive(1000));
+  /// Its share is constant below `rippled_fully_Nm`, so that the torque stays above 0.
+  ABS_HIL_OPTION(double, ripple_Nm, 0.0, .unit = "N m",
+                 .meaning = "simulation: amplitude with which the torque swings once a turn of the upper wheel",
+                 .range = rig::from_zero(rippled_fully_Nm));
+  ABS_HIL_OPTION(double, ripple_phase_rad, 0.0, .unit = "rad",
+                 .meaning = "simulation: angle of the upper wheel from the ripple's crest at the start",
+                 .range = rig::between(-6.2831853071795862, 6.2831853071795862));
 };
 
 /// What a real encoder does beside its steps and its eccentricity (docs/plants.md).

@@ -79,7 +79,11 @@ class Plant {
   [[nodiscard]] ContactState contact() const noexcept;
   void let_bearings_drift(const DriftFactors& factors) noexcept;
   template <class Torques, class State, class GoOn>
-  void advance_in_parts(const Torques& held, double duration_s, const State& x, const GoOn& go_on) noexcept;
+  void advance_in_parts(const Torques& held, double duration_s, const PlantInput& input, const State& x,
+                        const GoOn& go_on) noexcept;
+  [[nodiscard]] bool switches_resistors() const noexcept {
+    return options_.rig.motor.start_until_rad_s > 0.0 || options_.rig.motor.middle_until_rad_s > 0.0;
+  }
 
   PlantOptions options_;
   FactorProgress profile_;

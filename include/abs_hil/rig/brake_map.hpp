@@ -1,11 +1,16 @@
+// The brake as plant, model and gate share it: map (7), its inverse, and dead times.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "abs_hil/rig/duty_grid.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "abs_hil/rig/scalar.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::rig {
 
@@ -62,5 +67,85 @@ template <class Brake, class S>
                                               std::uint32_t duty_steps = 0) noexcept {
   return brake_duty_for(brake, torque_Nm, BrakeDuties<double>(brake, max_duty, duty_steps));
 }
+
+/// The duty that acts of those that were sent: a change acts after the dead time, one to a smaller duty sooner by the
+/// lead. A change that acts before an earlier one takes its place. Real-time safe but for the constructors.
+class BrakeDelay {
+ public:
+  BrakeDelay() = default;
+  explicit BrakeDelay(const BrakeParameters& brake)
+      : rising_s_(brake.brake_dead_time_s),
+        falling_s_(std::max(0.0, brake.brake_dead_time_s - brake.brake_release_lead_s)),
+        changes_(rising_s_ > 0.0 ? static_cast<std::size_t>(rising_s_ * fastest_cycle_Hz) + 2 : 0) {}
+
+  /// False if every duty acts at once; then the calls below are unnecessary.
+  [[nodiscard]] bool any() const noexcept { return !changes_.empty(); }
+  /// Returns to a brake that has long been released.
+  void start() noexcept {
+    first_ = count_ = 0;
+    time_s_ = newest_ = duty_ = 0.0;
+  }
+  /// Takes the duty that is sent from now on.
+  void send(double duty) noexcept {
+    settle();
+    if (duty == newest_) return;
+    const double due_s = time_s_ + (duty > newest_ ? rising_s_ : falling_s_);
+    newest_ = duty;
+    while (count_ > 0 && (at(count_ - 1).due_s >= due_s || count_ == changes_.size())) --count_;
+    at(count_++) = {due_s, duty};
+    settle();
+  }
+  /// The duty that acts now.
+  [[nodiscard]] double duty() const noexcept { return duty_; }
+  /// How long it acts, if no other is sent.
+  [[nodiscard]] double steady_s() const noexcept {
+    return count_ > 0 ? at(0).due_s - time_s_ : std::numeric_limits<double>::infinity();
+  }
+  /// Lets a time pass that is no longer than that.
+  void pass(double time_s) noexcept {
+    time_s_ += time_s;
+    settle();
+  }
+  /// Lets any time pass. Calls `each(duty, part_s)` for its parts, in order, each with the duty that acts in it.
+  template <class Each>
+  void pass(double time_s, const Each& each) noexcept {
+    for (double left_s = time_s; left_s > 0.0;) {
+      const double part_s = std::min(left_s, steady_s());
+      each(duty_, part_s);
+      pass(part_s);
+      left_s -= part_s;
+    }
+  }
+  void exchange_state(StateBytes& state) { state(changes_, first_, count_, time_s_, newest_, duty_); }
+
+ private:
+  /// The duty may change in every cycle. At a higher rate the newest change takes the place of the one before.
+  static constexpr double fastest_cycle_Hz = 10e3;
+  /// Rounding error of the sum of a run's intervals; a change that is due within it is due.
+  static constexpr double due_rounding_s = 1e-11;
+
+  struct Change {
+    double due_s;
+    double duty;
+  };
+
+  [[nodiscard]] Change& at(std::size_t n) noexcept { return changes_[(first_ + n) % changes_.size()]; }
+  [[nodiscard]] const Change& at(std::size_t n) const noexcept { return changes_[(first_ + n) % changes_.size()]; }
+  void settle() noexcept {
+    for (; count_ > 0 && at(0).due_s <= time_s_ + due_rounding_s; --count_) {
+      duty_ = at(0).duty;
+      first_ = (first_ + 1) % changes_.size();
+    }
+  }
+
+  double rising_s_{0.0};
+  double falling_s_{0.0};
+  std::vector<Change> changes_{};  ///< a ring of those on their way; empty: without dead time
+  std::size_t first_{0};
+  std::size_t count_{0};
+  double time_s_{0.0};
+  double newest_{0.0};  ///< the last that was sent
+  double duty_{0.0};
+};
 
 }  // namespace abs_hil::rig

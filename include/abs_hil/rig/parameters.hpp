@@ -51,7 +51,7 @@ struct TyreParameters {
                  .on_rig = "force of a locked wheel over theta is nearly sin(C pi/2): experiment slip-sweep");
 };
 
-/// Brake: static map (7) from duty to torque, first-order lag (6), and the fastest change of the torque.
+/// Brake: static map (7) from duty to torque, dead times, first-order lag (6), and the fastest change of the torque.
 struct BrakeParameters {
   ABS_HIL_OPTIONS(BrakeParameters);
   bool operator==(const BrakeParameters&) const = default;
@@ -69,6 +69,13 @@ struct BrakeParameters {
   ABS_HIL_OPTION(double, brake_rate_limit_Nm_s, 0.0, .unit = "N m/s",
                  .meaning = "fastest change of the brake torque; 0: none but the lag", .range = from_zero(1e6),
                  .on_rig = "slope of the brake torque after the largest step of duty: experiment brake-step");
+  ABS_HIL_OPTION(double, brake_dead_time_s, 0.0, .unit = "s",
+                 .meaning = "time after which the brake follows a change of its duty", .range = from_zero(0.2),
+                 .on_rig = "from a step of duty to the wheel's first change of speed: experiment brake-step");
+  /// Of the dead time, so that one that is changed moves both edges.
+  ABS_HIL_OPTION(double, brake_release_lead_s, 0.0, .unit = "s",
+                 .meaning = "how much sooner than that it follows a smaller duty", .range = from_zero(0.2),
+                 .on_rig = "the dead time less the time from duty 0 until the wheel spins up again");
 };
 
 /// Eccentricity of an encoder's disc: it reads angle + eccentricity sin(angle + phase).
@@ -90,6 +97,10 @@ struct EccentricityParameters {
 /// the simulated plant of Table 1. The lumped model without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M
 /// referred to the lower one, gives 2.1077 N m in closed form; slip in traction explains the difference.
 /// tests/plant_sim/actuators_test.cpp checks both.
+///
+/// A rig may start its motor through resistors, one or two, which it bridges at a speed each (Inteco's card, registers
+/// 90 to A0): below `start_until_rad_s` the stall torque is `start_torque_Nm`, from there to `middle_until_rad_s` it is
+/// `middle_torque_Nm`. A speed of 0: there is no such resistor.
 struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
   bool operator==(const DriveMotorParameters&) const = default;
@@ -100,7 +111,26 @@ struct DriveMotorParameters {
   ABS_HIL_OPTION(double, no_load_speed_rad_s, 220.0, .unit = "rad/s", .meaning = "drive motor's no-load speed",
                  .range = positive(2000),
                  .on_rig = "final speed at full duty with the upper wheel lifted, corrected for friction");
+  ABS_HIL_OPTION(double, start_torque_Nm, 0.0, .unit = "N m",
+                 .meaning = "stall torque while the start resistors are in the motor's circuit", .range = from_zero(100),
+                 .on_rig = "as stall_torque_Nm, below the speed at which the slope of the run-up jumps");
+  ABS_HIL_OPTION(double, start_until_rad_s, 0.0, .unit = "rad/s",
+                 .meaning = "lower wheel's speed that bridges a start resistor; 0: there is none",
+                 .range = from_zero(2000), .on_rig = "speed at which the slope of the run-up jumps");
+  ABS_HIL_OPTION(double, middle_torque_Nm, 0.0, .unit = "N m",
+                 .meaning = "the same while the second of two start resistors is left", .range = from_zero(100),
+                 .on_rig = "as start_torque_Nm, between two jumps");
+  ABS_HIL_OPTION(double, middle_until_rad_s, 0.0, .unit = "rad/s",
+                 .meaning = "lower wheel's speed that bridges the second of two; 0: there is none",
+                 .range = from_zero(2000), .on_rig = "as start_until_rad_s, the second jump");
 };
+
+/// The stall torque at a speed of the lower wheel, N m: that of the resistors which are still in the circuit. Real-time
+/// safe.
+[[nodiscard]] constexpr double stall_torque_Nm(const DriveMotorParameters& motor, double omega2_rad_s) noexcept {
+  if (omega2_rad_s < motor.start_until_rad_s) return motor.start_torque_Nm;
+  return omega2_rad_s < motor.middle_until_rad_s ? motor.middle_torque_Nm : motor.stall_torque_Nm;
+}
 
 /// All parameters of the rig that a controller may use, in SI units: of the simulated rig, or of the model of a rig.
 struct RigParameters {

@@ -29,7 +29,7 @@ struct LaneSettings::Parts {
   std::unique_ptr<control::SlipController> controller{};
   LaneSequence<double> sequence{};
   control::SpeedTracker<double> tracker{};
-  control::BrakeActuator actuator{};
+  control::BasicBrakeActuator<double> actuator{};
   std::int64_t period_ns{0};
   double period_s{0.0};
   double duty_steps{0.0};
@@ -226,7 +226,8 @@ bool eccentric(const rig::RigParameters& rig) {
 
 /// Flaws of brake and encoders, which lanes do not know.
 bool flawed(const plant_sim::PlantOptions& plant) {
-  return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.brake_flaws != plant_sim::BrakeFlaws{} ||
+  return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.rig.brake.brake_dead_time_s > 0.0 ||
+         plant.brake_flaws != plant_sim::BrakeFlaws{} ||
          eccentric(plant.rig) || plant.encoder_eccentricity_rad > 0.0 ||
          plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
          plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
@@ -275,6 +276,7 @@ LaneSettings::LaneSettings(const config::Settings& settings) {
   const double start_speed_rad_s = settings.experiment.start_speed_rad_s;
   if (settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) || eccentric(settings.model)) return;
   if (control::is_controller_file(settings.control.controller)) return;  // its code is not a law over a scalar
+  if (settings.model.brake.brake_dead_time_s > 0.0) return;              // lanes keep no duties on their way
   auto parts = std::make_unique<Parts>(Parts{.settings = settings});
   try {
     const run::Prepared prepared(settings);
