@@ -1,4 +1,5 @@
-// The controllers' model of the brake: b(u) of (7) and its inverse, the lag (6), and the duties that the board has.
+// The controllers' model of the brake: b(u) of (7) and its inverse, dead times, the lag (6), and the duties that the
+// board has.
 #pragma once
 
 #include <cstdint>
@@ -71,12 +72,15 @@ class BasicBrakeActuator {
   [[nodiscard]] S static_torque_Nm(const S& duty, const S& torque_Nm) const noexcept {
     return rig::select(ideal_ > 0.0, rig::larger(S(0.0), torque_Nm), rig::brake_torque_at(brake_, duty));
   }
-  /// Static torque of the last `command`.
+  /// Static torque of the duty that acts: without dead time, of the last `command`.
   [[nodiscard]] S sent_torque_Nm() const noexcept { return target_Nm_; }
   /// Largest torque that can be sent; infinite if ideal.
   [[nodiscard]] S max_torque_Nm() const noexcept { return max_torque_Nm_; }
   [[nodiscard]] S torque_Nm() const noexcept { return torque_Nm_; }            ///< estimated, now
   [[nodiscard]] S mean_torque_Nm() const noexcept { return mean_torque_Nm_; }  ///< over the last `advance`
+
+ protected:
+  S mean_torque_Nm_{0.0};  ///< over the last `advance`
 
  private:
   [[nodiscard]] Target nearest(const S& torque_Nm) const noexcept {
@@ -100,9 +104,45 @@ class BasicBrakeActuator {
   S was_in_gap_{0.0};
   S target_Nm_{0.0};
   S torque_Nm_{0.0};
-  S mean_torque_Nm_{0.0};
 };
-using BrakeActuator = BasicBrakeActuator<double>;
+
+/// The same behind the brake's dead times, for a single run: the estimates are those of the duties that act by now.
+class BrakeActuator : public BasicBrakeActuator<double> {
+ public:
+  BrakeActuator() = default;
+  BrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty, std::uint32_t duty_steps = 0)
+      : BasicBrakeActuator(brake, ideal, max_duty, duty_steps),
+        delay_(ideal ? rig::BrakeDelay() : rig::BrakeDelay(brake)) {}
+
+  void reset() noexcept {
+    BasicBrakeActuator::reset();
+    delay_.start();
+  }
+  void command(double duty, double torque_Nm) noexcept {
+    if (delay_.any()) [[unlikely]]
+      delay_.send(duty);
+    else
+      BasicBrakeActuator::command(duty, torque_Nm);
+  }
+  void advance(double dt_s) noexcept {
+    if (!delay_.any()) [[likely]]
+      return BasicBrakeActuator::advance(dt_s);
+    double impulse_Nms = 0.0;
+    delay_.pass(dt_s, [&](double duty, double part_s) {
+      BasicBrakeActuator::command(duty, 0.0);
+      BasicBrakeActuator::advance(part_s);
+      impulse_Nms += part_s * mean_torque_Nm_;
+    });
+    if (dt_s > 0.0) mean_torque_Nm_ = impulse_Nms / dt_s;
+  }
+  void exchange_state(rig::StateBytes& state) {
+    state(static_cast<BasicBrakeActuator<double>&>(*this));
+    delay_.exchange_state(state);
+  }
+
+ private:
+  rig::BrakeDelay delay_{};
+};
 
 template <class S>
 void BasicBrakeActuator<S>::prepare(const S& dt_s) noexcept {

@@ -153,10 +153,11 @@ std::string difference(const BoardRecord& record, const BoardRecord& present) {
     const bool lower = is_cap(name) && std::strtod(now.c_str(), nullptr) <= std::strtod(then->second.c_str(), nullptr);
     if (now != then->second && !lower) return name + " was " + then->second + " then and is " + now + " now";
   }
-  const auto& identity = record.identity.empty() ? identity_texts({}) : record.identity;
+  const auto defaults = identity_texts({});
   for (const auto& [name, now] : present.identity) {
-    const auto then = identity.find(name);
-    const std::string before = then == identity.end() ? "not known" : then->second;
+    // When a record is older than a key, the rig was taken to have the key's default.
+    const auto then = record.identity.find(name);
+    const std::string& before = then == record.identity.end() ? defaults.at(name) : then->second;
     if (now != before) {
       return "the rig's identity, from which the limits come, has changed: " + name + " was " + before +
              " then and is " + now + " now (rig.identity names the rig's file)";

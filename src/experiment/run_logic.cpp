@@ -93,7 +93,8 @@ RunLogic::RunLogic(RunLogicParts parts)
 void RunLogic::exchange_state(rig::StateBytes& state) {
   if (!controller_->exchange_state(state)) throw std::invalid_argument("this controller cannot give its state");
   sequence_.exchange_state(state);
-  state(upper_, lower_, upper_fit_, lower_fit_, learnt_, disc_error_rad_, actuator_);
+  actuator_.exchange_state(state);
+  state(upper_, lower_, upper_fit_, lower_fit_, learnt_, disc_error_rad_);
   state(slip_ref_, speeds_, upper_travel_rad_, lower_travel_rad_, distance_m_, slip_, alpha1_rad_s2_, alpha2_rad_s2_);
   state(asked_Nm_, target_Nm_, sent_Nm_, unsent_Nm_, in_slip_control_, not_given_, refused_output_, bump_Nm_);
   state(start_given_, answered_, end_, stands_still_, wheels_sound_, started_, start_ns_, last_ns_);

@@ -60,7 +60,7 @@ class CommandGate : public RunLatch {
   ///   intervention
   explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
                        const PlausibilityLimits& limits = {}, double brake_free_duty = 0.0,
-                       const SendableDuties& sendable = {}) noexcept
+                       const SendableDuties& sendable = {})
       : options_(options),
         sendable_(sendable),
         judge_within_ns_(static_cast<std::int64_t>(options.judge_within_s * static_cast<double>(rig::ns_per_s))),

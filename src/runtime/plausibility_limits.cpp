@@ -1,6 +1,7 @@
 // Derives the gate's limits from the rig's nominal parameters (docs/safety.md).
 #include "runtime/plausibility_limits.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include "abs_hil/rig/brake_map.hpp"
@@ -16,13 +17,16 @@ PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal
   const double tyre_N = rig.tyre.theta_N;
   const double brake_Nm =
       ideal_actuator ? std::numeric_limits<double>::infinity() : rig::brake_torque_at(rig.brake, 1.0);
+  const rig::DriveMotorParameters& motor = rig.motor;
+  const double motor_Nm = std::max({motor.stall_torque_Nm, rig::stall_torque_Nm(motor, 0.0),
+                                    rig::stall_torque_Nm(motor, motor.start_until_rad_s)});
   const double friction1_Nm = w.M10_Nm + w.d1_Nms_rad * options.overspeed_rad_s;
   const double friction2_Nm = w.M20_Nm + w.d2_Nms_rad * options.overspeed_rad_s;
   return {.enabled = true,
           .rad_per_count = rig::radians_per_count(rig.encoder_counts_per_rev),
           .upper_gain_rad_s2 = margin * w.r1_m * tyre_N / w.J1_kg_m2,
           .upper_loss_rad_s2 = margin * (w.r1_m * tyre_N + brake_Nm + friction1_Nm) / w.J1_kg_m2,
-          .lower_gain_rad_s2 = margin * (w.r2_m * tyre_N + rig.motor.stall_torque_Nm) / w.J2_kg_m2,
+          .lower_gain_rad_s2 = margin * (w.r2_m * tyre_N + motor_Nm) / w.J2_kg_m2,
           .lower_loss_rad_s2 = margin * (w.r2_m * tyre_N + friction2_Nm) / w.J2_kg_m2,
           .released_brake_Nm = least_sliding_part * w.r1_m * tyre_N,
           .overspeed_rad_s = options.overspeed_rad_s,
@@ -31,7 +35,7 @@ PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal
           .ideal_actuator = ideal_actuator,
           .wheels = w,
           .brake = rig.brake,
-          .motor = rig.motor};
+          .motor = motor};
 }
 
 }  // namespace abs_hil::runtime

@@ -24,7 +24,6 @@ class MomentumWatch {
         half_rolling_(0.5 * limits.wheels.r2_m / limits.wheels.r1_m),
         d2_Nms_rad_(limits.wheels.d2_Nms_rad),
         M20_Nm_(limits.wheels.M20_Nm),
-        stall_torque_Nm_(limits.motor.stall_torque_Nm),
         no_load_speed_rad_s_(limits.motor.no_load_speed_rad_s) {}
 
   /// Where a comparison found a fault, and the momentum gained. `due`: there was one.
@@ -110,7 +109,6 @@ class MomentumWatch {
   S half_rolling_{0.0};  ///< half of the ratio of the upper wheel's speed to the lower one's while both roll
   S d2_Nms_rad_{0.0};
   S M20_Nm_{0.0};
-  S stall_torque_Nm_{0.0};
   S no_load_speed_rad_s_{0.0};
   S apart_{0.0};
   Window before_{};
@@ -122,7 +120,7 @@ void MomentumWatch<S>::add(const BasicSpeedWindow<S>& s, const S& brake_Nm) noex
   constexpr double friction_margin = 2.0;
   const S p1_kg_m_s = J1_per_r1_kg_m_ * s.omega1_rad_s;
   const S p_kg_m_s = p1_kg_m_s + J2_per_r2_kg_m_ * s.omega2_rad_s;
-  const S motor_Nm = stall_torque_Nm_ * s.motor_duty * (1.0 - s.omega2_rad_s / no_load_speed_rad_s_);
+  const S motor_Nm = s.motor_stall_Nm * (1.0 - s.omega2_rad_s / no_load_speed_rad_s_);
   const S friction_Nm = M20_Nm_ + d2_Nms_rad_ * s.omega2_rad_s;
   const auto begins = now_.lasted_s == 0.0;
   if (rig::any(begins)) [[unlikely]]

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "rig/encoder_scale.hpp"
 
@@ -27,8 +26,9 @@ bool beyond(std::int32_t travel, std::int32_t most) noexcept {
 }
 }  // namespace
 
-SpeedWindows::SpeedWindows(const PlausibilityLimits& limits) noexcept
+SpeedWindows::SpeedWindows(const PlausibilityLimits& limits)
     : limits_(limits),
+      delay_(limits.ideal_actuator ? rig::BrakeDelay() : rig::BrakeDelay(limits.brake)),
       most_counts_per_s_(limits.enabled ? 2.0 * limits.overspeed_rad_s / limits.rad_per_count : 0.0),
       sure_counts_(static_cast<std::int32_t>(resolution_counts + most_counts_per_s_ * leap_slack_s)),
       resolving_ns_(static_cast<std::int64_t>(resolution_counts * limits.rad_per_count / resolution_max_rad_s *
@@ -52,6 +52,17 @@ bool SpeedWindows::fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept {
   stale_cycles_ = 0;
   fresh_ns_ = now_ns;
   return true;
+}
+
+double SpeedWindows::impulse_Nms(const rig::Command& sent, double time_s) noexcept {
+  if (limits_.ideal_actuator) return sent.brake_torque_Nm * time_s;
+  if (!delay_.any()) [[likely]]
+    return rig::brake_torque_at(limits_.brake, sent.brake_duty) * time_s;
+  double sum_Nms = 0.0;
+  delay_.send(sent.brake_duty);
+  delay_.pass(time_s,
+              [&](double duty, double part_s) { sum_Nms += rig::brake_torque_at(limits_.brake, duty) * part_s; });
+  return sum_Nms;
 }
 
 [[gnu::cold]] CheckResult SpeedWindows::leaps(std::int32_t upper_travel, std::int32_t lower_travel,
@@ -84,9 +95,7 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
     begin(measurement);
     return {};
   }
-  const double brake_Nm =
-      limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
-  brake_impulse_Nms_ += brake_Nm * since_s;
+  brake_impulse_Nms_ += impulse_Nms(sent, since_s);
   motor_duty_s_ += sent.motor_duty * since_s;
   const std::int32_t upper_travel = rig::counts_between(upper_before, upper_);
   const std::int32_t lower_travel = rig::counts_between(lower_before, lower_);
@@ -106,6 +115,8 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
   speed_window_ = speed_window_over<double>(
       dt_s, limits_.rad_per_count, rig::counts_between(begin_upper_, measurement.upper_counts),
       rig::counts_between(begin_lower_, measurement.lower_counts), brake_impulse_Nms_, motor_duty_s_);
+  speed_window_.motor_stall_Nm =
+      rig::stall_torque_Nm(limits_.motor, speed_window_.omega2_rad_s) * speed_window_.motor_duty;
   speed_window_.begin_error_s = static_cast<double>(begin_error_ns_) * rig::s_per_ns;
   speed_window_.end_error_s = static_cast<double>(stamp_error_ns_) * rig::s_per_ns;
   complete_ = true;

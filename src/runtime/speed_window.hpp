@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/reason.hpp"
@@ -54,6 +55,7 @@ struct BasicSpeedWindow {
   S end_error_s{0.0};       ///< uncertainty of the stamp with which it ended
   S brake_target_Nm{0.0};   ///< mean of b(u); with an ideal actuator mean of the commanded torque
   S motor_duty{0.0};        ///< mean
+  S motor_stall_Nm{0.0};    ///< stall torque at that duty
 
   /// Uncertainty of the window's duration.
   [[nodiscard]] S stamp_error_s() const noexcept { return begin_error_s + end_error_s; }
@@ -83,7 +85,7 @@ template <class S>
 /// certain enough to be judged. Real-time safe.
 class SpeedWindows {
  public:
-  explicit SpeedWindows(const PlausibilityLimits& limits) noexcept;
+  explicit SpeedWindows(const PlausibilityLimits& limits);
 
   /// Takes a measurement and the command that has acted since the previous one.
   /// @param now_ns      the cycle's wake-up, on the clock of the time stamps; the reading began then
@@ -108,8 +110,11 @@ class SpeedWindows {
   /// The fault if a counter has moved faster than any wheel can, in `since_s` and the slack.
   [[nodiscard]] CheckResult leaps(std::int32_t upper_travel, std::int32_t lower_travel, double since_s) const noexcept;
   void begin(const rig::Measurement& measurement) noexcept;
+  /// Integral of b(u) over a time under the sent command, N m s; of the duties that act in it.
+  [[nodiscard]] double impulse_Nms(const rig::Command& sent, double time_s) noexcept;
 
   PlausibilityLimits limits_;
+  rig::BrakeDelay delay_;
   double most_counts_per_s_;  ///< of a counter that does not leap
   std::int32_t sure_counts_;
   std::int64_t resolving_ns_;

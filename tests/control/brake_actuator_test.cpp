@@ -75,6 +75,55 @@ TEST_CASE("The lag's torque and its mean are exact for any step, also a jitterin
   }
 }
 
+TEST_CASE("With dead times the estimate is that of the duties that act by now, at any step") {
+  rig::BrakeParameters late = brake;
+  late.brake_dead_time_s = 0.0129;
+  late.brake_release_lead_s = 0.0037;
+  control::BrakeActuator actuator{late, false, 1.0};
+  control::BrakeActuator prompt{brake, false, 1.0};
+  const double dt = GENERATE(1e-3, 0.37e-3, 8e-3);
+  // A pulse of 30 ms: it acts from 12.9 to 39.2 ms.
+  const double begins_s = 0.0129, ends_s = 0.03 + 0.0092;
+  double time_s = 0.0;
+  for (int cycle = 0; time_s < 0.1; ++cycle) {
+    const double from_s = time_s;
+    actuator.command(from_s < 0.03 - 1e-9 ? 0.8 : 0.0, 0.0);
+    // The first cycle from 30 ms on releases it.
+    const double released_s = dt * std::ceil(0.03 / dt - 1e-9);
+    actuator.advance(dt);
+    time_s = dt * (cycle + 1);
+    double impulse_Nms = 0.0;
+    for (double at_s = from_s; at_s < time_s - 1e-12;) {
+      const double off_s = released_s + ends_s - 0.03;
+      const bool on = at_s > begins_s - 1e-12 && at_s < off_s - 1e-12;
+      const double next_s = at_s < begins_s - 1e-12 ? begins_s : on ? off_s : 1.0;
+      const double part_s = std::min(next_s, time_s) - at_s;
+      prompt.command(on ? 0.8 : 0.0, 0.0);
+      prompt.advance(part_s);
+      impulse_Nms += part_s * prompt.mean_torque_Nm();
+      at_s += part_s;
+    }
+    REQUIRE_THAT(actuator.torque_Nm(), WithinAbs(prompt.torque_Nm(), 1e-9));
+    REQUIRE_THAT(actuator.mean_torque_Nm(), WithinAbs(impulse_Nms / dt, 1e-9));
+  }
+  CHECK(actuator.torque_Nm() > 0.1);
+  // Its state goes on elsewhere with the duties that are under way.
+  actuator.command(1.0, 0.0);
+  rig::StateBytes kept;
+  actuator.exchange_state(kept);
+  const std::string bytes = kept.written();
+  control::BrakeActuator other{late, false, 1.0};
+  rig::StateBytes again(bytes);
+  other.exchange_state(again);
+  actuator.advance(0.02);
+  other.advance(0.02);
+  CHECK(other.torque_Nm() == actuator.torque_Nm());
+  CHECK(other.torque_Nm() > 0.5);
+  actuator.reset();
+  actuator.advance(0.1);
+  CHECK(actuator.torque_Nm() == 0.0);
+}
+
 TEST_CASE("Full brake reaches 63.2 % of its torque after one time constant") {
   control::BrakeActuator actuator{brake, false, 1.0};
   actuator.command(1.0, 0.0);

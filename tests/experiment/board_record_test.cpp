@@ -113,6 +113,16 @@ TEST_CASE("A record holds for the identity of the rig alone, from which the limi
   CHECK(lab.refusal().empty());
 }
 
+TEST_CASE("A record that is older than a key of the identity holds for the key's default alone") {
+  Lab lab;
+  BoardRecord record = describe_board(lab.options, lab.rig, card, false);
+  CHECK(record.identity.erase("rig.brake_dead_time_s") == 1);
+  write_record(record, record_folders(lab.options.records));
+  CHECK(lab.refusal().empty());
+  lab.rig.parameters.brake.brake_dead_time_s = 0.0129;
+  CHECK_THAT(lab.refusal(), Contains("rig.brake_dead_time_s was 0 then and is 0.0129 now"));
+}
+
 TEST_CASE("A record from before the identity holds for the default identity, and says so") {
   Lab lab;
   BoardRecord record = describe_board(lab.options, {}, card, false);

@@ -174,6 +174,8 @@ TEST_CASE("runs with ideal sensors, ideal actuator, faults and stop requests are
       {{"experiment.brake_limit_s=30"}, 1, rig::Reason::interrupt_signal},  // from outside, after 1000 cycles
       {{"experiment.brake_limit_s=30", "experiment.stop_brake_duty=0.5"}, 1, rig::Reason::interrupt_signal},
       {{"plant.friction_profile=braking time: 1; 0.5 at 0.3"}},
+      {{"plant.brake_dead_time_s=0.0129", "plant.brake_release_lead_s=0.0037", "plant.brake_overshoot=0.7",
+        "plant.brake_ripple_Nm=1.5", "plant.motor_start_torque_Nm=1", "plant.motor_start_until_rad_s=105"}},
   };
   for (const Recipe& recipe : recipes) {
     INFO(recipe.assignments.front());
