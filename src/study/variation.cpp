@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <span>
 #include <stdexcept>
@@ -43,8 +44,8 @@ double parse_magnitude(std::string_view entry, std::string_view text) {
 }
 
 void parse_entry(std::string_view entry, Variation& v) {
-  if (entry == "phase") {
-    v.phase = true;
+  if (entry == "phase" || entry == "measured") {
+    (entry == "phase" ? v.phase : v.measured) = true;
     return;
   }
   const std::size_t equals = entry.find('=');
@@ -53,7 +54,8 @@ void parse_entry(std::string_view entry, Variation& v) {
   const auto* const named = std::ranges::find(magnitudes, name, &Magnitude::name);
   if (!all_parameters && named == magnitudes.end()) {
     throw std::invalid_argument(fmt::format(
-        "--vary: \"{}\" is unknown; give parameters, wheels, brake, tyre, theta, radii, phase or none", entry));
+        "--vary: \"{}\" is unknown; give parameters, wheels, brake, tyre, theta, radii, phase, measured or none",
+        entry));
   }
   const double magnitude = parse_magnitude(entry, equals == entry.npos ? std::string_view() : entry.substr(equals + 1));
   if (all_parameters) {
@@ -73,6 +75,33 @@ Perturbation perturbation_of(const Variation& v, const Factor& factor) {
   p.theta = factor(v.theta);
   for (double* radius : {&p.r1, &p.r2}) *radius = factor(v.radii);
   return p;
+}
+
+/// A rig as it was measured: the maker's model within the intervals of docs/plants.md, one draw for each number.
+void make_measured(plant_sim::PlantOptions& plant, const std::array<double, 15>& draws) {
+  auto in = [next = draws.begin()](double from, double to) mutable { return std::lerp(from, to, *next++); };
+  const double half_turn_rad = std::numbers::pi;
+  plant.tyre = "inteco-mu";
+  plant.load = "lever";
+  plant.lever = {};
+  plant.inteco_mu = {};
+  const double friction = in(0.5, 1.05);  // over the printed curve
+  for (double* weight : {&plant.inteco_mu.w1, &plant.inteco_mu.w2, &plant.inteco_mu.w3, &plant.inteco_mu.w4})
+    *weight *= friction;
+  plant.rig.wheels = {.J1_kg_m2 = in(6.0e-3, 7.6e-3), .M20_Nm = in(0.0925, 0.1425)};
+  rig::BrakeParameters& brake = plant.rig.brake;
+  const double full_Nm = in(16.0, 20.0);
+  brake = {.u0 = in(0.455, 0.485), .c31_per_s = in(350.0, 1000.0), .brake_dead_time_s = in(0.011, 0.014)};
+  brake.b1_Nm = full_Nm / (1.0 - brake.u0);
+  brake.b2_Nm = -brake.b1_Nm * brake.u0;
+  brake.brake_release_lead_s = brake.brake_dead_time_s - in(0.008, 0.0105);
+  plant.brake_flaws = {.overshoot = in(0.0, 1.0), .ripple_Nm = in(0.0, 2.0)};
+  plant.brake_flaws.ripple_phase_rad = in(-half_turn_rad, half_turn_rad);
+  plant.rig.motor = {.stall_torque_Nm = 2.70 * in(0.95, 1.05),
+                     .no_load_speed_rad_s = 488.0,
+                     .start_torque_Nm = 0.970 * in(0.95, 1.05),
+                     .start_until_rad_s = 105.0};
+  plant.rig.lower_encoder = {.eccentricity_rad = in(0.0, 0.015), .phase_rad = in(-half_turn_rad, half_turn_rad)};
 }
 
 /// Uniform in [-1, 1) from the generator's upper 53 bits: the same with every standard library.
@@ -106,6 +135,7 @@ std::string Variation::text() const {
     add(magnitude.name, this->*magnitude.value);
   }
   if (phase) entries.emplace_back("phase");
+  if (measured) entries.emplace_back("measured");
   return entries.empty() ? "none" : fmt::format("{}", fmt::join(entries, ","));
 }
 
@@ -118,15 +148,21 @@ Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {
       perturbation_of(v, [&generator](double magnitude) { return 1.0 + magnitude * symmetric(generator); });
   const std::uint64_t sensor_seed = generator();
   p.sensor_seed = v.phase ? sensor_seed : fixed_sensor_seed;
+  if (v.measured) {
+    for (double& number : p.measured.emplace()) number = 0.5 * (1.0 + symmetric(generator));
+  }
   return p;
 }
 
 Perturbation smallest(const Variation& v) noexcept {
-  return perturbation_of(v, [](double magnitude) { return 1.0 - magnitude; });
+  Perturbation p = perturbation_of(v, [](double magnitude) { return 1.0 - magnitude; });
+  if (v.measured) p.measured.emplace();
+  return p;
 }
 
 plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const Perturbation& p) {
   plant_sim::PlantOptions plant = nominal;
+  if (p.measured) make_measured(plant, *p.measured);
   rig::WheelParameters& w = plant.rig.wheels;
   w.J1_kg_m2 *= p.J1;
   w.J2_kg_m2 *= p.J2;

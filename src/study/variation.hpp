@@ -1,7 +1,9 @@
 // Plants that vary around a nominal one, drawn from a seed and a number.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,12 +20,13 @@ struct Variation {
   double theta{0.0};   ///< peak tyre force: theta, or the friction coefficient with the lever
   double radii{0.0};   ///< r1 and r2, 0 by default, as a caliper measures them; an error affects every slip value
   bool phase{false};   ///< initial position of each encoder within a count
+  bool measured{
+      false};  ///< in place of the nominal plant a rig as it was measured (docs/plants.md); the rest scales it
 
   /// "parameters=0.1,theta=0.1,phase" (wheels, brake and tyre at 10 %, theta at 10 %, sensor phase).
   [[nodiscard]] static Variation standard() noexcept;
-  /// Comma-separated `name=magnitude` and `phase`. `parameters` stands for wheels, brake and tyre; "none" for no
-  /// variation.
-  /// Magnitudes in [0, 0.5]. Throws std::invalid_argument, naming entry and range.
+  /// Comma-separated `name=magnitude`, `phase` and `measured`. `parameters` stands for wheels, brake and tyre; "none"
+  /// for no variation. Magnitudes in [0, 0.5]. Throws std::invalid_argument, naming entry and range.
   [[nodiscard]] static Variation parse(std::string_view text);
   /// The text form that `parse` accepts.
   [[nodiscard]] std::string text() const;
@@ -39,6 +42,7 @@ struct Perturbation {
   double theta{1.0};
   double r1{1.0}, r2{1.0};
   std::uint64_t sensor_seed{1};
+  std::optional<std::array<double, 15>> measured{};  ///< numbers in [0, 1): where in their ranges its values lie
 
   friend bool operator==(const Perturbation&, const Perturbation&) = default;
 };

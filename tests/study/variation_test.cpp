@@ -14,7 +14,7 @@ using Catch::Matchers::WithinRel;
 
 TEST_CASE("a specification reads back as it was written") {
   for (const char* text : {"none", "phase", "theta=0.2", "parameters=0.1,theta=0.1,phase", "wheels=0.05,tyre=0.25",
-                           "brake=0.5,radii=0.01,phase"}) {
+                           "brake=0.5,radii=0.01,phase", "measured", "theta=0.1,phase,measured"}) {
     INFO(text);
     CHECK(Variation::parse(text).text() == text);
   }
@@ -68,6 +68,28 @@ TEST_CASE("a perturbation depends on seed and number alone, and no parameter dep
   CHECK(theta_only.J1 == 1.0);
   CHECK(draw(Variation::parse("phase"), 3, 17).sensor_seed == all.sensor_seed);
   CHECK(theta_only.sensor_seed == draw({}, 99, 0).sensor_seed);
+}
+
+TEST_CASE("a rig as measured takes the place of any nominal plant, and the other entries scale it") {
+  plant_sim::PlantOptions one;
+  plant_sim::PlantOptions other;
+  other.tyre = "inteco-mu";
+  other.inteco_mu.w4 = 0.1;
+  other.rig.brake.c31_per_s = 3.0;
+  other.brake_flaws.hysteresis = 0.2;
+  other.rig.encoder_counts_per_rev = one.rig.encoder_counts_per_rev = 1024;  // no matter of the session
+  const Perturbation drawn = draw(Variation::parse("measured,phase"), 3, 5);
+  plant_sim::PlantOptions from_one = perturbed(one, drawn);
+  const plant_sim::PlantOptions from_other = perturbed(other, drawn);
+  CHECK(from_one.rig.brake == from_other.rig.brake);
+  CHECK(from_one.rig.wheels == from_other.rig.wheels);
+  CHECK(from_one.rig.motor == from_other.rig.motor);
+  CHECK(from_one.brake_flaws == from_other.brake_flaws);
+  CHECK(from_one.inteco_mu == from_other.inteco_mu);
+  CHECK(from_other.rig.encoder_counts_per_rev == 1024);
+  CHECK_FALSE(perturbed(one, draw(Variation::parse("measured"), 3, 6)).rig.brake == from_one.rig.brake);
+  const Perturbation scaled = draw(Variation::parse("wheels=0.1,measured"), 3, 5);
+  CHECK_THAT(perturbed(one, scaled).rig.wheels.J1_kg_m2, WithinRel(scaled.J1 * from_one.rig.wheels.J1_kg_m2, 1e-15));
 }
 
 TEST_CASE("a perturbation changes the parameter that it names") {

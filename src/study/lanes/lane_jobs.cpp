@@ -227,8 +227,7 @@ bool eccentric(const rig::RigParameters& rig) {
 /// Flaws of brake and encoders, which lanes do not know.
 bool flawed(const plant_sim::PlantOptions& plant) {
   return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.rig.brake.brake_dead_time_s > 0.0 ||
-         plant.brake_flaws != plant_sim::BrakeFlaws{} ||
-         eccentric(plant.rig) || plant.encoder_eccentricity_rad > 0.0 ||
+         plant.brake_flaws != plant_sim::BrakeFlaws{} || eccentric(plant.rig) || plant.encoder_eccentricity_rad > 0.0 ||
          plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
          plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
 }

@@ -157,7 +157,8 @@ Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>&
   if (chance(0.2)) c.job.plant.ideal_actuator = s.plant.ideal_actuator = true;
   if (chance(0.02)) s.plant.ideal_actuator = !s.plant.ideal_actuator;
   if (chance(0.05)) c.job.plant.rig.brake.brake_rate_limit_Nm_s = 50.0 + 200.0 * uniform(generator);
-  if (chance(0.05)) c.job.plant.brake_flaws = {.hysteresis = 0.1, .fading_per_J = 3e-4, .overshoot = 0.5, .ripple_Nm = 1.0};
+  if (chance(0.05))
+    c.job.plant.brake_flaws = {.hysteresis = 0.1, .fading_per_J = 3e-4, .overshoot = 0.5, .ripple_Nm = 1.0};
   if (chance(0.05)) c.job.plant.rig.brake.brake_dead_time_s = 0.003;
   if (chance(0.05)) s.model.brake.brake_dead_time_s = 0.005;
   if (chance(0.05)) c.job.plant.rig.upper_encoder = {.eccentricity_rad = 0.01, .phase_rad = 1.0};
