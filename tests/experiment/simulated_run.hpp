@@ -8,6 +8,8 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "analysis/run_metrics.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
 #include "config/plan.hpp"
 #include "driver/sim/sim_driver.hpp"
 #include "run/run.hpp"
@@ -24,6 +26,14 @@ class Recorder final : public rig::RecordSink {
   std::vector<rig::CycleRecord> records;
   std::vector<double> distances_m;
 };
+
+/// A plant of config/plants.
+inline plant_sim::PlantOptions shipped_plant(const std::string& name) {
+  config::Settings settings;
+  config::KeyTable keys(settings);
+  config::load_file(config::plant_file(name), keys, config::Tables::of_plant);
+  return settings.plant;
+}
 
 /// Options of a simulated run. As in the configuration, the model is the plant unless it is given.
 struct Setup {

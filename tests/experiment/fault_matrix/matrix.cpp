@@ -25,7 +25,9 @@ Setup matrix_setup(Backend backend) {
   setup.experiment.coast_s = 0.3;
   setup.experiment.stopped_s = 0.3;
   setup.gate.supply_min_V = 15.0;
-  if (backend != Backend::sim) setup.gate.brake_duty_max = 0.7;  // the drivers' own cap
+  if (is_board(backend)) setup.gate.brake_duty_max = 0.7;  // the drivers' own cap
+  if (backend == Backend::measured_step) setup.plant = shipped_plant("measured-step");
+  if (backend == Backend::measured_relay) setup.plant = shipped_plant("measured-relay");
   return setup;
 }
 
@@ -71,7 +73,7 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
 }  // namespace
 
 std::vector<rig::Phase> phases_of(Backend backend) {
-  if (backend != Backend::sim) return {Phase::accelerate, Phase::brake};
+  if (is_board(backend)) return {Phase::accelerate, Phase::brake};
   return {Phase::idle, Phase::accelerate, Phase::coast, Phase::brake, Phase::hold, Phase::stopped};
 }
 

@@ -13,10 +13,14 @@
 
 namespace abs_hil::experiment::test {
 
-/// Where the faults are injected: the simulated rig, the driver of the PCI card on the emulated card's registers, or
-/// the driver of a HostMot2 board on the registers of one.
-enum class Backend : std::uint8_t { sim, card, hm2 };
-inline constexpr std::array backends{Backend::sim, Backend::card, Backend::hm2};
+/// Where the faults are injected: the simulated rig, the driver of the PCI card on the emulated card's registers, the
+/// driver of a HostMot2 board on the registers of one, or the simulated rig as it was measured in two sessions.
+enum class Backend : std::uint8_t { sim, card, hm2, measured_step, measured_relay };
+inline constexpr std::array backends{Backend::sim, Backend::card, Backend::hm2, Backend::measured_step,
+                                     Backend::measured_relay};
+[[nodiscard]] constexpr bool is_board(Backend backend) noexcept {
+  return backend == Backend::card || backend == Backend::hm2;
+}
 
 /// One fault in one phase, and its result.
 struct MatrixCase {

@@ -55,7 +55,7 @@ bool touches_braking(const driver::Injection& injection) {
 }  // namespace
 
 TEST_CASE("every fault in every phase ends in the safe state in time, with the right reason and a complete record") {
-  const Backend backend = GENERATE(Backend::sim, Backend::card, Backend::hm2);
+  const Backend backend = GENERATE(from_range(backends));
   for (const MatrixCase& c : matrix_of(backend).cases) {
     const Expectation expectation = expected(backend, c.injection);
     CAPTURE(driver::to_text(c.injection), static_cast<int>(backend), static_cast<int>(c.reason), c.reaction_s);
@@ -72,7 +72,7 @@ TEST_CASE("every fault in every phase ends in the safe state in time, with the r
 }
 
 TEST_CASE("a run that continues despite a fault stays within the stated degradation") {
-  const Matrix& matrix = matrix_of(GENERATE(Backend::sim, Backend::card, Backend::hm2));
+  const Matrix& matrix = matrix_of(GENERATE(from_range(backends)));
   for (const MatrixCase& c : matrix.cases) {
     if (!c.survived()) continue;
     CAPTURE(driver::to_text(c.injection));

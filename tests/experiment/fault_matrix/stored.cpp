@@ -37,7 +37,7 @@ std::string rows(const Matrix& matrix, const std::string& backend) {
 }  // namespace
 
 std::string stored(const std::array<Matrix, backends.size()>& matrices) {
-  constexpr std::array names{"sim", "card", "hm2"};
+  constexpr std::array names{"sim", "card", "hm2", "measured-step", "measured-relay"};
   std::string text = "backend,phase,signal,fault,reason,after_ms,stop_distance_change_percent\n";
   for (std::size_t i = 0; i < matrices.size(); ++i) text += rows(matrices[i], names[i]);
   return text;
