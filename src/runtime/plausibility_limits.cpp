@@ -18,8 +18,8 @@ PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal
   const double brake_Nm =
       ideal_actuator ? std::numeric_limits<double>::infinity() : rig::brake_torque_at(rig.brake, 1.0);
   const rig::DriveMotorParameters& motor = rig.motor;
-  const double motor_Nm = std::max({motor.stall_torque_Nm, rig::stall_torque_Nm(motor, 0.0),
-                                    rig::stall_torque_Nm(motor, motor.start_until_rad_s)});
+  const double motor_Nm = std::max(
+      {motor.stall_torque_Nm, rig::stall_torque_Nm(motor, 0.0), rig::stall_torque_Nm(motor, motor.start_until_rad_s)});
   const double friction1_Nm = w.M10_Nm + w.d1_Nms_rad * options.overspeed_rad_s;
   const double friction2_Nm = w.M20_Nm + w.d2_Nms_rad * options.overspeed_rad_s;
   return {.enabled = true,

@@ -112,7 +112,8 @@ struct DriveMotorParameters {
                  .range = positive(2000),
                  .on_rig = "final speed at full duty with the upper wheel lifted, corrected for friction");
   ABS_HIL_OPTION(double, start_torque_Nm, 0.0, .unit = "N m",
-                 .meaning = "stall torque while the start resistors are in the motor's circuit", .range = from_zero(100),
+                 .meaning = "stall torque while the start resistors are in the motor's circuit",
+                 .range = from_zero(100),
                  .on_rig = "as stall_torque_Nm, below the speed at which the slope of the run-up jumps");
   ABS_HIL_OPTION(double, start_until_rad_s, 0.0, .unit = "rad/s",
                  .meaning = "lower wheel's speed that bridges a start resistor; 0: there is none",
