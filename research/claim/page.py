@@ -100,10 +100,11 @@ class Page:
 
     def sections(self) -> Iterator[tuple[str, str]]:
         head, rows = self.claim()
-        yield 'claim', table(head, [row for row in rows if row[1] != 'ideal'])
+        shown = [0, 2, 3, 4, 5, 6]
+        yield 'claim', table([head[n] for n in shown], [[bare(row[n]) for n in shown] for row in rows if row[1] != 'ideal'])
         yield 'map', self.map_table('real')
         head, rows = self.parts.table()
-        yield 'parts', table(head[1:], [row[1:] for row in rows if row[0] == PLANTS[0]])
+        yield 'parts', table(head[1:], [list(map(bare, row[1:])) for row in rows if row[0] == PLANTS[0]])
 
     def files(self) -> Iterator[tuple[str, str]]:
         """The CSV files in docs/reference: all rows."""
@@ -219,6 +220,11 @@ class Page:
 def _span(one: Map, name: str) -> str:
     least, _, most = one.span(name)
     return '' if np.isnan(least) else f'{least:.3f} to {most:.3f}'
+
+
+def bare(cell: str) -> str:
+    """Without its interval, which the CSV file has."""
+    return re.sub(r' \[.*\]$', '', cell)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
