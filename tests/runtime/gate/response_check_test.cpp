@@ -22,6 +22,8 @@ PlausibilityLimits paper_limits() {
   return plausibility_limits(rig, false, options);
 }
 
+const double stall_Nm = rig::RigParameters{}.motor.stall_torque_Nm;
+
 struct Bench {
   ResponseCheck check{paper_limits()};
   double omega1{0.0}, omega2{0.0};
@@ -31,8 +33,12 @@ struct Bench {
     for (int i = 0; i < count; ++i) {
       omega1 += rad_s2 * dt_s;
       omega2 += rad_s2 * dt_s;
-      const CheckResult found = check.update(
-          {.dt_s = dt_s, .omega1_rad_s = omega1, .omega2_rad_s = omega2, .motor_duty = motor_duty}, brake_Nm);
+      const CheckResult found = check.update({.dt_s = dt_s,
+                                              .omega1_rad_s = omega1,
+                                              .omega2_rad_s = omega2,
+                                              .motor_duty = motor_duty,
+                                              .motor_stall_Nm = stall_Nm * motor_duty},
+                                             brake_Nm);
       if (!found.sound()) return found;
     }
     return {};
@@ -200,7 +206,8 @@ std::pair<double, Reason> found_after(double omega_rad_s, double rad_s2, double 
                                             .resolution_rad_s = resolution_rad / dt_s,
                                             .begin_error_s = stamp_error_s,
                                             .end_error_s = stamp_error_s,
-                                            .motor_duty = motor_duty},
+                                            .motor_duty = motor_duty,
+                                            .motor_stall_Nm = stall_Nm * motor_duty},
                                            brake_Nm);
     if (!found.sound()) return {i * dt_s, found.reason};
   }
@@ -306,7 +313,8 @@ TEST_CASE("motor and brake are judged by the momentum of wheels that are apart, 
   silent.check.note_wheels_apart(true);
   CheckResult found{};
   for (int i = 0; i < 103 && found.sound(); ++i) {
-    found = silent.check.update({.dt_s = dt_s, .omega1_rad_s = 100.0, .motor_duty = 1.0}, 0.0);
+    found =
+        silent.check.update({.dt_s = dt_s, .omega1_rad_s = 100.0, .motor_duty = 1.0, .motor_stall_Nm = stall_Nm}, 0.0);
   }
   CHECK(found.reason == Reason::motor_no_response);
 }
