@@ -6,7 +6,9 @@
 // rad/s, brake torque, N m, and five random factors), the parameters' scaled changes p and the readings r, rad:
 //
 //     r = H x + D p + e,            e ~ N(0, q / weight),  q = (2 pi / counts)^2 / 12
-//     x' = F x + G p + gap + v,     v ~ N(0, noise): only the factors f' = k f + ...,  k = exp(-duration / time constant)
+//     x' = F x + G p + gap + v,     v ~ N(0, noise)
+//
+// Noise drives only the factors: f' = k f + ..., k = exp(-duration / time constant).
 //
 // With A = H' H / q (weighted) and P = L L' the covariance of x before the readings, a Kalman filter's step is
 //

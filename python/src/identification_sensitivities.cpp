@@ -4,8 +4,10 @@
 // With x(t; x0, p, u) the plant's motion from the window's start x0 (angles, rad, speeds, rad/s, brake torque, N m),
 // with parameters p under the duties u, and c the change of the fit that a step of a parameter is,
 //
-//     H = [I2, (x(t; x0 + h e_j, p, u) - x(t; x0, p, u)) / h]     of both angles, by speeds and torque; h = 1e-5 max(1, |x0_j|)
-//     D_i = (x(t; x0, p + dp_i, u_i) - x(t; x0, p, u)) / c_i      of both angles; F and G are those of all states at the end
+//     H   = [I2, (x(t; x0 + h e_j, p, u) - x(t; x0, p, u)) / h]   of both angles, by speeds and torque
+//     D_i = (x(t; x0, p + dp_i, u_i) - x(t; x0, p, u)) / c_i      of both angles
+//
+// with h = 1e-5 max(1, |x0_j|). F and G are those of all states at the window's end.
 //
 // The angles only add up. Where flaws of the brake turn its duties into others (brake_flaws.py), u_i are those that the
 // moved parameter asks for.

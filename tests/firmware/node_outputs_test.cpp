@@ -173,7 +173,7 @@ TEST_CASE("The latch holds: DDR and status do not bring outputs back while a val
   node.write(0x1100, 2);
   node.set_duty(0, 1000);
   CHECK_FALSE(node.drives(0));  // the bite has disarmed it
-  node.poll(25'000);  // within 20 ms of its opening
+  node.poll(25'000);            // within 20 ms of its opening
   CHECK(node.read(0x0D00) == 0);
   node.write(0x0C00, 499'999);
   CHECK(node.duty(0) == 1000);
