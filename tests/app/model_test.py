@@ -80,7 +80,7 @@ class Model(ProgramTest):
     def test_whole_models(self):
         summary, _ = self.summary_of('--model', 'paper-timing')
         self.assertEqual((summary['plant'], summary['model']), ('paper-table1', 'paper-timing'))
-        self.assertEqual(len(summary['config']['model']), 23)
+        self.assertEqual(len(summary['config']['model']), 29)
         self.assertIn('theta_N', summary['model_differences'])
         mine = self.folder / 'mine.toml'
         mine.write_text('[plant]\ntheta_N = 30\n[model]\nJ1_kg_m2 = 0.008\n')

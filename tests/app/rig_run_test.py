@@ -39,7 +39,7 @@ class RigRun(RigTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         found = self.summary(summary)
         self.assertNotIn('plant', found['config'])
-        self.assertEqual((len(found['config']['model']), found['config']['model']['theta_N']), (23, 24.0))
+        self.assertEqual((len(found['config']['model']), found['config']['model']['theta_N']), (29, 24.0))
         self.assertEqual((found['model'], found['model_differences']), ('paper-table1', None))
         replayed = self.run_program('replay', log, '--check')
         self.assertEqual(replayed.returncode, 0, replayed.stderr)

@@ -59,7 +59,7 @@ TEST_CASE("each value of the rig is a value of plant and model") {
       return plant.name == "plant." + key.name.substr(6) && model_key(keys, plant.name) == &key;
     }));
   }
-  CHECK(of_model == 23);
+  CHECK(of_model == 29);
   CHECK(model_key(f.table.keys(), "plant.ideal_actuator") == nullptr);
   CHECK(model_key(f.table.keys(), "control.slip_ref") == nullptr);
 }
@@ -139,7 +139,7 @@ TEST_CASE("on a rig only the model exists") {
   CHECK(f.settings.plant.rig.wheels.r2_m == 0.1);  // for $plant.r2_m in a script
   const nlohmann::ordered_json json = f.table.to_json();
   CHECK_FALSE(json.contains("plant"));
-  CHECK(json["model"].size() == 23);
+  CHECK(json["model"].size() == 29);
   CHECK(json["model"]["r2_m"] == 0.1);
   CHECK_THAT(f.table.to_toml(), !Contains("[plant]") && Contains("[model]"));
 }

@@ -335,6 +335,15 @@ TEST_CASE("While its owner numbers its datagrams, nobody feeds or drives without
   }
 }
 
+TEST_CASE("Nobody but the owner switches a PWM pin on") {
+  Owned node;
+  node.ask("81C2 0411 00000000 82D1 1400 09000000");
+  REQUIRE_FALSE(node.drives(1));
+  node.ask("81C2 0411 02000000");
+  CHECK_FALSE(node.drives(1));
+  CHECK((node.errors() & 4U) != 0);
+}
+
 TEST_CASE("Anybody may make the node safe, and read, also while it has an owner") {
   for (const char* datagram : {"81C2 0040 00000000", "81C2 000C 01000000", "81C2 000C 00000080", "81C2 0011 00000000",
                                "82C2 0040 0000000000000000 81C2 000C 01000000"}) {
