@@ -55,8 +55,6 @@ _MAKERS = (
     Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop', most=9.0),
     Parameter('mu_a', '1', 'contact', 'slip-sweep', most=9.0, prior=2.0),
     Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
-    Parameter('mu_w1', '1', 'contact', 'locked-stop', floor=0.05, least=-1.0, most=1.0, prior=1.0),
-    Parameter('mu_w3', '1', 'contact', 'locked-stop', floor=0.05, least=-1.0, most=1.0, prior=1.0),
 )
 #: the fastest change of the brake's torque; fitted where the logs show one
 RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop or pulses', least=0.5, most=9e5)
@@ -90,7 +88,7 @@ GIVEN = {'J2_kg_m2': 'kg m^2', 'r2_m': 'm'}
 
 @dataclass(frozen=True)
 class Form:
-    """A form of the plant. `road` names the parameters that a factor over the tyre's force multiplies, its height first."""
+    """A form of the plant. `road` names the parameters that a factor over the tyre's force multiplies."""
     name: str
     meaning: str
     settings: Mapping[str, str]
@@ -103,15 +101,15 @@ class Form:
         return tuple(p for p in self.parameters if p not in _SHARED)
 
 
-def _form(tyre: str, load: str, own: tuple[Parameter, ...], *road: str) -> Form:
+def _form(tyre: str, load: str, own: tuple[Parameter, ...], road: str) -> Form:
     meaning = ', '.join(({'magic-formula': 'magic formula', 'inteco-mu': "the maker's curve"}[tyre],
                          {'constant': 'constant load', 'lever': 'load by the lever'}[load]))
-    return Form(tyre, meaning, {'plant.tyre': tyre, 'plant.load': load}, _SHARED + own, road)
+    return Form(tyre, meaning, {'plant.tyre': tyre, 'plant.load': load}, _SHARED + own, (road,))
 
 
 #: all pairs of a tyre and a load
 ALL_FORMS = (_form('magic-formula', 'constant', (_THETA, *_MAGIC), 'theta_N'),
-             _form('inteco-mu', 'lever', (_LEVER, *_MAKERS), 'mu_w4', 'mu_w1', 'mu_w3'),
+             _form('inteco-mu', 'lever', (_LEVER, *_MAKERS), 'mu_w4'),
              _form('magic-formula', 'lever', (_LEVER, _MU_PEAK, *_MAGIC), 'mu_peak'),
              _form('inteco-mu', 'constant', (_THETA, *_MAKERS), 'theta_N'))
 #: by tyre, those that are tried unless the start is one of the others
@@ -133,8 +131,6 @@ def base_options(form: Form, start: PathLike) -> Any:
     given.update({f'plant.{flaw.key}': flaw.none for flaw in (RATE_LIMIT, *FLAWS)} | {'plant.encoder_eccentricity_rad': 0.0})
     given.update({f'plant.{wheel}_encoder_{flaw}': 0 for wheel in WHEELS
                   for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts', 'lost_counts')})
-    given.update({f'plant.{key}': 0.0 for key in ('brake_overshoot', 'brake_ripple_Nm', 'brake_release_lead_s')
-                  if key in _core.PlantOptions(options(plant=start)).values()})
     given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing',
                                                            'lower_bearing')})
     return _core.PlantOptions(options(plant=start, set=given))
