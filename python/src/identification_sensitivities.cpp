@@ -153,7 +153,8 @@ class LanesOf : public Lanes {
     const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(options);
     const auto* tyre = std::get_if<Tyre<double>>(&tyres);
     if (tyre == nullptr || options.ideal_actuator || !options.friction_profile.empty() ||
-        plant_sim::Drift(options.drift).any() ||
+        plant_sim::Drift(options.drift).any() || options.rig.brake.brake_dead_time_s > 0.0 ||
+        options.rig.motor.start_until_rad_s > 0.0 || options.rig.motor.middle_until_rad_s > 0.0 ||
         options.brake_flaws != plant_sim::BrakeFlaws{.release_ratio = options.brake_flaws.release_ratio})
       return std::nullopt;
     const plant_sim::LoadModel loads = plant_sim::make_load_model(options, tyre->peak_mu(), 1.0);
