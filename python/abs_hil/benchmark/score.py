@@ -52,6 +52,10 @@ class Entry:
         return (':' in self.name and not self.name.endswith(('.so', '.fmu'))
                 and importlib.util.find_spec('abs_hil._network') is None)
 
+    def made(self) -> Any:
+        """The controller of a run in this process. research/nmpc_table.py has objects of its own."""
+        return made(self.name)
+
 
 def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
     nominal = {plant: {name: row['value'] for name, row in keys(plant=plant).items()} for plant in {case.plant for case in cases}}
@@ -82,7 +86,7 @@ FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSH
 
 def _in_this_process(entry: Entry, run: dict[str, Any]) -> Study:
     """What the law raises is the fault that it is in a process of its own."""
-    law = made(entry.name)
+    law = entry.made()
     try:
         study = simulate_many([{**run, 'controller': law}], keep_going=True)
     except Exception as error:
