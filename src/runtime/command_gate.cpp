@@ -104,7 +104,7 @@ double CommandGate::limited(double duty, double most, double sendable, GateActio
 
 double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
                            GateAction action) noexcept {
-  const double most = before + rate_per_s * elapsed_s;
+  const double most = before + rate_per_s * std::max(0.0, elapsed_s);  // a clock that goes back gives no time
   if (duty <= most + rise_rounding) return duty;
   note(action);
   return most;
@@ -177,8 +177,13 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
 }
 
 /// A rise goes on from the unrounded duty: steps of the PWM must not swallow a slow one. If the driver sent much less,
-/// the rise goes on from that.
+/// the rise goes on from that. A driver that names what is no duty is a fault: nobody knows what acts.
 void CommandGate::note_sent(const rig::Command& sent) noexcept {
+  for (const double duty : {sent.motor_duty, sent.brake_duty}) {
+    if (duty >= 0.0 && duty <= 1.0) continue;  // false for NaN
+    latch(Reason::driver_write_failed, duty);
+    return;
+  }
   brake_risen_ = std::min(brake_risen_, sent.brake_duty + rounded_down_most);
   motor_risen_ = std::min(motor_risen_, sent.motor_duty + rounded_down_most);
   sent_ = sent;

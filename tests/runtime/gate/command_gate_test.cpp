@@ -262,3 +262,36 @@ TEST_CASE("after a duty that the board did not take, the next rise begins at wha
   CHECK(motor.check({.motor_duty = 0.5, .motor_enable = true}, {.now_ns = 10 * ms}).command.motor_duty ==
         Approx(0.2 + half_step + 0.01).epsilon(1e-9));
 }
+
+TEST_CASE("a clock that goes back never makes a duty negative") {
+  CommandGate gate({.motor_rate_per_s = 10.0, .brake_rate_per_s = 10.0});
+  const rig::Command wanted{.brake_duty = 0.5, .brake_torque_Nm = 1.0};
+  static_cast<void>(gate.check(wanted, {{100.0, 100.0}, Phase::brake, 1'000 * ms}));
+  for (const std::int64_t now_ns : {999 * ms, 0 * ms, -1'000'000 * ms}) {
+    const rig::Command sent = gate.check(wanted, {{100.0, 100.0}, Phase::brake, now_ns}).command;
+    CHECK(sent.brake_duty >= 0.0);
+    CHECK(sent.brake_duty <= 0.5);
+  }
+  CommandGate motor({.motor_rate_per_s = 10.0, .brake_rate_per_s = 10.0});
+  const rig::Command drive{.motor_duty = 0.5, .motor_enable = true};
+  static_cast<void>(motor.check(drive, {{100.0, 100.0}, Phase::accelerate, 1'000 * ms}));
+  CHECK(motor.check(drive, {{100.0, 100.0}, Phase::accelerate, 0}).command.motor_duty >= 0.0);
+}
+
+TEST_CASE("a driver that says it sent what is no duty is a fault, and nothing follows but the safe command") {
+  for (const double said : {not_a_number, -1.0, 1.5, infinite}) {
+    for (const bool motor : {false, true}) {
+      CommandGate gate(GateOptions{});
+      const rig::Command wanted{.brake_duty = 0.5, .brake_torque_Nm = 1.0};
+      static_cast<void>(gate.check(wanted, moderate));
+      rig::Command sent = wanted;
+      (motor ? sent.motor_duty : sent.brake_duty) = said;
+      gate.note_sent(sent);
+      CAPTURE(said, motor);
+      CHECK(gate.fault() == Reason::driver_write_failed);
+      for (int cycle = 1; cycle < 5; ++cycle) {
+        CHECK(is_safe(gate.check(wanted, {{100.0, 100.0}, Phase::brake, cycle * ms}).command));
+      }
+    }
+  }
+}
