@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -27,6 +28,8 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "driver/monotonic_time.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
@@ -34,6 +37,7 @@
 #include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
 #include "guardian/talker.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"
 
 namespace abs_hil::guardian {
@@ -201,7 +205,10 @@ class Service {
     start_standby();
     start_talker();
     tell_systemd("READY=1");
-    run_guard(guard, clock_, [&] { between_looks(guard); });
+    run_guard(guard, clock_, [&] {
+      between_looks(guard);
+      return std::array{talker_process_.get(), standby_process_.get()};
+    });
     page_->over.store(true, std::memory_order_relaxed);
     ::unlink(options.socket.c_str());
     end_companions();
@@ -209,10 +216,11 @@ class Service {
   }
 
  private:
-  static constexpr std::int64_t companions_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
+  static constexpr std::int64_t hunt_again_ns = 100'000'000;
+  static constexpr std::int64_t foreign_ends_within_ns = 20'000'000;
 
   void between_looks(BoardGuard& guard) {
     if (told_to_end.exchange(false, std::memory_order_relaxed)) guard.end();
@@ -221,21 +229,29 @@ class Service {
       tell_systemd("WATCHDOG=1");
       next_alive_ns_ = now_ns + alive_ns;
     }
-    if (now_ns < next_companions_ns_) return;
-    next_companions_ns_ = now_ns + companions_ns;
     const std::uint64_t beats = page_->talker_beats.load(std::memory_order_relaxed);
     if (beats != talker_beats_) talker_beat_ns_ = now_ns;
     talker_beats_ = beats;
     if (talker_ > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_, SIGKILL);
     for (pid_t child = 0; (child = ::waitpid(-1, nullptr, WNOHANG)) > 0;) {
-      if (child == standby_) standby_ = 0;
+      if (child == standby_) {
+        standby_ = 0;
+        standby_process_ = driver::FileDescriptor(-1);  // else the guard would not sleep until there is another one
+      }
+      if (child == hunter_) {
+        hunter_ = 0;
+        next_hunt_ns_ = now_ns + hunt_again_ns;
+      }
       if (child != talker_) continue;
       talker_ = 0;
+      talker_process_ = driver::FileDescriptor(-1);
       guard.lost_talker();
     }
     // What fails for want of memory or processes is tried again: the guard does not depend on it.
     if (talker_ <= 0) restart_talker();
     if (standby_ <= 0) start_standby();
+    if (guard.driven_by_others() && hunter_ <= 0 && now_ns >= next_hunt_ns_)
+      hunter_ = start_companion({}, [this](pid_t keeper) { hunt(keeper); });
   }
 
   void restart_talker() noexcept try {
@@ -249,11 +265,31 @@ class Service {
     talker_beat_ns_ = clock_.now_ns();
     talker_ = start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
                               [this](pid_t guard) { talk(guard); });
+    talker_process_ = driver::FileDescriptor(talker_ > 0 ? open_pidfd(talker_) : -1);
   }
   void start_standby() {
     standby_ = start_companion({}, [this](pid_t guard) { stand_by(guard); });
+    standby_process_ = driver::FileDescriptor(standby_ > 0 ? open_pidfd(standby_) : -1);
   }
 
+  /// Ends those who drive the board without a lease, as `abs_hil safe` does. They are asked first, but not for long.
+  [[noreturn]] void hunt(pid_t guard) {
+    constexpr sched_param below_guard{.sched_priority = 1};
+    if (::sched_getscheduler(0) == SCHED_FIFO) ::sched_setscheduler(0, SCHED_FIFO, &below_guard);
+    std::vector<BoardOwner> owners = owners_of({files_of_board(settings_.driver)});
+    std::erase_if(owners, [&](const BoardOwner& owner) {
+      return owner.pid == guard || owner.pid == talker_ || owner.pid == standby_ || is_zero_writer(owner.pid);
+    });
+    end_owners(owners, [](std::size_t /*board*/, std::int64_t asked_ns) {
+      return driver::monotonic_ns() > asked_ns + foreign_ends_within_ns;
+    });
+    for (const BoardOwner& owner : owners) {
+      say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
+          ") drove the board without a lease, and " + (owner.ended ? "was ended" : "could not be ended"));
+    }
+    if (owners.empty()) say("something drives the board without a lease, and no process of this computer has it open");
+    ::_exit(exit_verified);
+  }
   [[noreturn]] void talk(pid_t guard) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != guard) ::_exit(exit_not_started);
@@ -341,8 +377,11 @@ class Service {
   const runtime::RealtimeReport* realtime_{nullptr};
   pid_t talker_{0};
   pid_t standby_{0};
+  pid_t hunter_{0};
+  driver::FileDescriptor talker_process_{-1};
+  driver::FileDescriptor standby_process_{-1};
+  std::int64_t next_hunt_ns_{0};
   std::int64_t next_alive_ns_{0};
-  std::int64_t next_companions_ns_{0};
   std::int64_t talker_beat_ns_{0};
   std::uint64_t talker_beats_{0};
 };

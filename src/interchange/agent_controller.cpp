@@ -26,7 +26,8 @@ constexpr double longest_hold_s = 1.0;
                               "; abs_hil.learning.rig_environment makes this file and starts the program with it");
 }
 
-AgentPage* mapped(const std::string& file) {
+/// @param hold_s  becomes the page's; read once, because the agent may change the page at any time
+AgentPage* mapped(const std::string& file, double& hold_s) {
   const driver::FileDescriptor opened(::open(file.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
   if (opened.get() < 0) refuse_agent(file, rig::refusal(errno, file, rig::reading));
   struct stat facts {};
@@ -38,7 +39,8 @@ AgentPage* mapped(const std::string& file) {
       ::mmap(nullptr, AgentPage::size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, opened.get(), 0);
   if (memory == MAP_FAILED) refuse_agent(file, rig::refusal(errno, file, rig::reading));
   auto* const page = static_cast<AgentPage*>(memory);
-  if (page->mark == AgentPage::right_mark && page->hold_s > 0.0 && page->hold_s <= longest_hold_s) return page;
+  hold_s = page->hold_s;
+  if (page->mark == AgentPage::right_mark && hold_s > 0.0 && hold_s <= longest_hold_s) return page;
   ::munmap(memory, AgentPage::size);
   refuse_agent(file, "its mark is not abs_agt01, or it holds an action for a time outside (0, 1] s");
 }
@@ -46,7 +48,7 @@ AgentPage* mapped(const std::string& file) {
 }  // namespace
 
 AgentController::AgentController(const std::string& file, const control::ControllerContext& context)
-    : page_(mapped(file)),
+    : page_(mapped(file, hold_s_)),
       r2_m_(context.rig.wheels.r2_m),
       full_torque_Nm_(rig::brake_torque_at(context.rig.brake, 1.0)) {}
 
@@ -71,7 +73,7 @@ void AgentController::take_action(double dt_s) noexcept {
     if (acts_) action_ = asked;
     if (!acts_) ++refused_;
   }
-  if (age_s_ > page_->hold_s) acts_ = false;
+  if (age_s_ > hold_s_) acts_ = false;
   if (!acts_) {
     action_ = 0.0;
     ++late_cycles_;

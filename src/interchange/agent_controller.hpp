@@ -62,6 +62,7 @@ class AgentController final : public control::SlipController {
   void take_action(double dt_s) noexcept;
   void show(const control::SlipInput& input) noexcept;
 
+  double hold_s_{0.0};  ///< before `page_`, whose making sets it
   AgentPage* page_{nullptr};
   double r2_m_;
   double full_torque_Nm_;  ///< of a brake without an upper end

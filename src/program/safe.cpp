@@ -17,6 +17,7 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "driver/monotonic_time.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "program/first_place.hpp"
 #include "program/subcommands.hpp"
@@ -25,6 +26,10 @@
 namespace abs_hil::program {
 
 namespace {
+
+using guardian::BoardOwner;
+using guardian::end_owners;
+using guardian::owners_of;
 
 constexpr double most_insist_s = 3600.0;
 

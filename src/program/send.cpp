@@ -7,12 +7,15 @@
 #include "commands/sender.hpp"
 #include "config/config_error.hpp"
 #include "program/subcommands.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
 
 namespace {
+
+constexpr std::size_t longest_shown = 1000;
 
 double number_of(const std::string& text) {
   if (const auto value = rig::parse_number<double>(text)) return *value;
@@ -45,15 +48,15 @@ int send(const SendOptions& options) {
                                                .key_file = s.commands.key_file,
                                                .timeout_s = options.timeout_s});
   if (reply.outcome == commands::Outcome::accepted) {
-    cli::print("{}\n", reply.message);
+    cli::print("{}\n", rig::clean_text(reply.message, longest_shown));
     if (!reply.authentic) {
       spdlog::warn(
           "this answer is not authenticated: anybody on the network could have sent it; give the run and send the "
           "same key with --set commands.key_file=FILE, or look at the rig");
     }
-    return exit_completed;
+    return reply.authentic ? exit_completed : exit_ended_early;
   }
-  cli::print(stderr, "abs_hil: {}\n", reply.message);
+  cli::print(stderr, "abs_hil: {}\n", rig::clean_text(reply.message, longest_shown));
   return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;
 }
 

@@ -135,6 +135,42 @@ class Leases(ResidentTest):
         _, words = program.communicate(timeout=30)
         self.assertEqual(program.returncode, 0, words)
 
+    def test_a_foreign_writer_is_found_and_ended(self):
+        """Its time on, by the card's clock, is printed: a busy computer stretches it."""
+        drives = """
+import os, signal, struct, sys, time
+if sys.argv[2] == 'stubborn':
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+card = os.open(sys.argv[1], os.O_RDWR)
+for n in range(60_000):
+    os.pwrite(card, struct.pack('<I', 0), 0x60)
+    os.pwrite(card, struct.pack('<I', 3000), 0x6C)
+    time.sleep(0.001)
+"""
+        for manner, ends_by in (('mild', -signal.SIGTERM), ('stubborn', -signal.SIGKILL)):
+            with self.subTest(manner):
+                emulator = self.emulator()
+                service = self.service(emulator)
+                changes = self.folder / f'changes-{manner}'
+                emulator.command(f'changes {changes}')
+                card = next(emulator.root.glob('*/resource2'))
+                writer = subprocess.Popen([sys.executable, '-c', drives, card, manner])
+                try:
+                    self.assertEqual(writer.wait(timeout=20), ends_by)
+                finally:
+                    writer.kill()
+                wait_until(lambda service=service: 'drove the board without a lease, and was ended' in service.said(),
+                           'it does not say so')
+                wait_until(lambda emulator=emulator: emulator.wire() == SAFE, 'the board stays on')
+                self.assertIsNone(service.process.poll())
+                emulator.command('changes off')
+                rows = [tuple(map(int, line.split())) for line in changes.read_text().splitlines()]
+                on_ns = sum(after[0] - row[0] for row, after in zip(rows, rows[1:]) if any(row[1:]))
+                print(f'a {manner} foreign writer was on for {on_ns * 1e-6:.1f} ms in all', flush=True)
+                self.assertGreater(on_ns, 0)
+                service.end()
+                emulator.end()
+
     def test_board_that_comes_back_is_zeroed(self):
         emulator = self.emulator()
         service = self.service(emulator)

@@ -217,3 +217,82 @@ TEST_CASE("the report of a run that dies after it released its outputs says when
   CHECK(service.said(NewsWord::ended) != nullptr);
   CHECK_FALSE(service.guard.over());
 }
+
+TEST_CASE("a foreign duty between the cover and the first cycle is gone within 20 ms, and does not come back") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  std::int64_t on_ns = 0;
+  service.happens = [&](std::int64_t now_ns) {  // somebody writes it again every 10 ms
+    if (now_ns % (10 * ms) == 0) service.board.duty = 0.8;
+    if (service.board.duty > 0.0) on_ns += 100 * us;
+  };
+  service.pass(20 * ms);
+  CHECK(on_ns <= 12 * ms);
+  on_ns = 0;
+  service.pass(900 * ms);
+  CHECK(on_ns <= 500 * ms);
+  service.happens = {};
+  service.pass(200 * ms);
+  CHECK(service.board.duty == 0.0);
+  CHECK_FALSE(service.processes.lives(run_process));  // it has not begun its first cycle within a second
+}
+
+TEST_CASE("a holder that drives before its first cycle is ended") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  service.happens = [&](std::int64_t) { service.board.duty = 0.8; };
+  const std::int64_t from_ns = service.clock.now_ns();
+  while (service.processes.lives(run_process) && service.clock.now_ns() < from_ns + 100 * ms) service.pass(ms);
+  CHECK(service.clock.now_ns() - from_ns <= 20 * ms);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  CHECK(service.said(NewsWord::acted)->report.reason == Reason::foreign_writer);
+}
+
+TEST_CASE("from its first cycle on the board is the run's, whose first duty is not taken for another's") {
+  Service service;
+  service.guard.begin();
+  static_cast<void>(service.covered());
+  service.pass(2 * ms);
+  const std::size_t from = service.story.size();
+  service.board.duty = 0.6;
+  service.pass(200 * ms);
+  CHECK(service.story.size() == from);
+  CHECK(service.board.duty == 0.6);
+}
+
+TEST_CASE("the guard says that somebody drives without a lease after five looks, at any pace, and while he does") {
+  const std::int64_t every_ms = GENERATE(1, 10, 200, 5'000);
+  Service service;
+  service.guard.begin();
+  std::int64_t on_ns = 0;
+  service.happens = [&](std::int64_t now_ns) {
+    if (now_ns % (every_ms * ms) == 0) service.board.duty = 0.5;
+    if (service.board.duty > 0.0) on_ns += 100 * us;
+  };
+  const std::int64_t from_ns = service.clock.now_ns();
+  while (!service.guard.driven_by_others()) {
+    service.pass(ms);
+    REQUIRE(service.clock.now_ns() - from_ns <= 5 * every_ms * ms + 20 * ms);
+  }
+  CAPTURE(every_ms);
+  CHECK(on_ns <= 30 * ms);
+  service.happens = {};
+  service.pass(50 * ms);
+  CHECK_FALSE(service.guard.driven_by_others());
+}
+
+TEST_CASE("a board that comes back with a duty is no foreign writer") {
+  Service service;
+  service.guard.begin();
+  for (int time = 0; time < 3; ++time) {
+    service.board.duty = 0.5;
+    service.pass(50 * ms);
+    CHECK(service.board.duty == 0.0);
+    CHECK_FALSE(service.guard.driven_by_others());
+    service.pass(61'000 * ms);
+  }
+}

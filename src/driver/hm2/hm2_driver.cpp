@@ -60,6 +60,12 @@ std::unique_ptr<SafeStateWriter> make_writer(const Hm2Options& options, const Ru
   return safe_state_writer(options, opener(options));
 }
 
+std::string text_of(const sockaddr_in& address) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  ::inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
+  return formatted("%s:%u", text.data(), static_cast<unsigned>(ntohs(address.sin_port)));
+}
+
 /// Nothing but an emulator answers at this computer's own address.
 BoardReality reality(const Hm2Options& options) {
   constexpr std::uint32_t loopback = 127;
@@ -323,6 +329,7 @@ Backend hm2_backend() {
       .outputs = output_grid,
       .reality = reality,
       .check = check,
+      .udp_peer = [](const Hm2Options& options) { return text_of(parse_address(options.address)); },
       .free_options = {"address", "answer_timeout_us", "plausible_speed_rad_s"},
   });
 }
