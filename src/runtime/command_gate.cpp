@@ -177,7 +177,7 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
 }
 
 /// A rise goes on from the unrounded duty: steps of the PWM must not swallow a slow one. If the driver sent much less,
-/// the rise goes on from that. A driver that names what is no duty is a fault: nobody knows what acts.
+/// the rise goes on from that. It is a fault if the driver names a duty outside 0 to 1: what acts is then unknown.
 void CommandGate::note_sent(const rig::Command& sent) noexcept {
   for (const double duty : {sent.motor_duty, sent.brake_duty}) {
     if (duty >= 0.0 && duty <= 1.0) continue;  // false for NaN

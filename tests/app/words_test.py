@@ -69,7 +69,7 @@ class Folders(ProgramTest):
                                 env={**os.environ, 'ABS_HIL_RUNS_DIR': 'runs', **environment})
 
     def test_names_of_run_folders_are_cut_and_keep_their_letters(self):
-        for name, part in (('x' * 250, 'xxx'), ('动' * 83, '动动'), ('Übergang à Łódź', '-Ubergang-a-Lodz'), ('опыт 1', '-opyt-1')):
+        for name, part in (('a' * 250, 'aaa'), ('动' * 83, '动动'), ('Übergang à Łódź', '-Ubergang-a-Lodz'), ('опыт 1', '-opyt-1')):
             with self.subTest(name):
                 script = self.folder / f'{name}.toml'
                 script.write_text((SOURCE / 'config/experiments/brake-step.toml').read_text())

@@ -89,7 +89,7 @@ MISMATCHES: dict[str, tuple[dict[str, Value], bool, dict[str, Value]]] = {
 LEAST_AT_DROP_M_S = 3.0
 #: changes that the model had no key for when the set was fixed
 _PLANT_ONLY = ('brake_dead_time_s', 'brake_hysteresis')
-#: Those of them that it has one for by now. In this set it is not told.
+#: Those of them that it has a key for by now. It is not told them: otherwise the set, which has a checksum, would be another one.
 _UNTOLD = ('brake_dead_time_s',)
 #: roads of the mismatches
 _MISMATCH_ROADS = ('even', 'jump', 'patches')

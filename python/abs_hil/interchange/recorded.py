@@ -144,8 +144,8 @@ def to_parquet(run: Run, name: str) -> None:
 
 def to_csv(run: Run, name: str, out: pathlib.Path) -> str:
     """Writes all files, or none, and returns words about what is in them. Of an event log OUT.csv has the columns of --csv, then
-    every other quantity; OUT.CHANNEL.csv the fields of each other channel's messages; OUT.raw.csv, as hexadecimal digits, what
-    is none of our messages. The last columns say where in the log a row came from."""
+    every other quantity; OUT.CHANNEL.csv the fields of each other channel's messages; OUT.raw.csv other
+    programs' messages, as hexadecimal digits. The last columns say where in the log a row came from."""
     log, number = named(name)
     log = log / 'run.lcmlog' if (log / 'run.lcmlog').is_file() else log
     if kind_of(log) != LOG:
