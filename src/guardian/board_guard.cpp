@@ -97,6 +97,8 @@ void BoardGuard::take(const Order& order) noexcept {
 void BoardGuard::grant(const Order& order) noexcept {
   if (lease_ != 0 || duty_ != Duty::keep || ending_) return tell(NewsWord::refused, Refusal::held);
   look_at_board();
+  // A datagram that is lost is no board that cannot be made safe.
+  for (int more = 0; more < 2 && board_.error == driver::IoError::no_answer; ++more) look_at_board();
   if (!former_gone()) return tell(NewsWord::refused, Refusal::former_lives);
   if (!board_.ok()) return tell(NewsWord::refused, Refusal::not_safe);
   const int handle = parts_.processes.open(order.pid);

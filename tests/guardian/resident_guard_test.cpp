@@ -76,6 +76,17 @@ TEST_CASE("a board that does not answer is tried every 10 ms, and no lease is gr
   service.granted();
 }
 
+TEST_CASE("two answers that are lost at a request refuse no lease, a third one does") {
+  for (const int lost : {2, 3}) {
+    Service service;
+    service.guard.begin();
+    service.pass(20 * ms);
+    service.board.fails_first = lost;
+    const News told = service.answer({.word = OrderWord::grant, .pid = run_process});
+    CHECK(told.word == (lost == 2 ? NewsWord::granted : NewsWord::refused));
+  }
+}
+
 TEST_CASE("one process at a time has the lease, and only one that the guard can end") {
   Service service;
   service.guard.begin();
