@@ -224,11 +224,19 @@ class BoardTime {
   /// What the board's time begins at: 0 in lock-step, otherwise a time of this computer, ns.
   [[nodiscard]] std::int64_t start_ns() const noexcept { return started_ns_; }
   /// Begins anew at power-on.
-  void restart() noexcept { started_ns_ = lock_step_ ? 0 : driver::monotonic_ns(); }
+  void restart() noexcept {
+    started_ns_ = lock_step_ ? 0 : driver::monotonic_ns();
+    seen_ns_ = 0;
+  }
   /// Advances the board to this computer's time; in lock-step only the host advances it.
   template <typename Board>
   void catch_up(Board& board) {
-    if (!lock_step_) advance(board, driver::monotonic_ns() - started_ns_);
+    if (lock_step_) return;
+    const std::int64_t now_ns = driver::monotonic_ns() - started_ns_;
+    const std::int64_t unseen_ns = now_ns - std::exchange(seen_ns_, now_ns);
+    // The emulator looks every ms (main.cpp). After more than two the computer has paused it.
+    if (unseen_ns > 2 * period_ns) board.stood_still(unseen_ns - period_ns);
+    advance(board, now_ns);
   }
   /// Advances the board to `time_ns` and writes every row that is due in between.
   template <typename Board>
@@ -249,6 +257,7 @@ class BoardTime {
 
   bool lock_step_;
   std::int64_t started_ns_{0};
+  std::int64_t seen_ns_{0};  ///< the board's time at the last look
   OutputFile stream_{};
   std::int64_t next_ns_{0};
 };

@@ -112,6 +112,9 @@ class CanNode final : public RigBehind {
     return (options_.supply_V < options_.supply_min_V ? 2U : 0U) | (overspeed_latched_ ? 1U : 0U) |
            (options_.temperature_C > options_.temperature_max_C ? 4U : 0U);
   }
+  void stood_still(std::int64_t duration_ns) override {
+    if (last_command_ns_ >= 0) last_command_ns_ += duration_ns;
+  }
   /// Number of received activations, deactivations and commands, valid or not.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }

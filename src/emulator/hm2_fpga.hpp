@@ -83,6 +83,10 @@ class Hm2Fpga : public UdpBoard {
     note_outputs("power-on");
   }
   void bite() override { bite_for("watchdog"); }
+  void stood_still(std::int64_t duration_ns) override {
+    bites_ns_ += duration_ns;
+    last_pet_ns_ += duration_ns;
+  }
   void turn_by_hand(bool upper_wheel, double revolutions) override {
     const plant_sim::PlantState before = plant().state();
     RigBehind::turn_by_hand(upper_wheel, revolutions);

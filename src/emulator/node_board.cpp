@@ -70,6 +70,12 @@ class NodeBoard final : public UdpBoard {
     core_.allowed_us = 0;
     look();
   }
+  void stood_still(std::int64_t duration_ns) override {
+    standing_ns_ = time_ns();
+    advance_to(time_ns() + duration_ns);
+    standing_ns_.reset();
+    paused_ns_ += duration_ns;
+  }
   void turn_by_hand(bool upper_wheel, double revolutions) override {
     // In parts that the 16 bits of the hardware's counter can tell from turns backwards.
     constexpr int parts = 64;
@@ -111,7 +117,10 @@ class NodeBoard final : public UdpBoard {
     return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { look(); }
-  [[nodiscard]] std::uint32_t now_us() const noexcept { return static_cast<std::uint32_t>(time_ns() / 1000); }
+  /// The chip's clock.
+  [[nodiscard]] std::uint32_t now_us() const noexcept {
+    return static_cast<std::uint32_t>((standing_ns_.value_or(time_ns()) - paused_ns_) / 1000);
+  }
   /// Advances the time as the commands of space 5 say, and returns the others.
   std::vector<std::uint8_t> obey_lock_step(std::span<const std::uint8_t> datagram) {
     constexpr std::ptrdiff_t head_bytes = 4;
@@ -154,6 +163,8 @@ class NodeBoard final : public UdpBoard {
 
   node_identity identity_{};
   node_core core_{};
+  std::int64_t paused_ns_{0};                  ///< what the chip's clock has not seen of the board's time
+  std::optional<std::int64_t> standing_ns_{};  ///< since when that clock stands
 };
 
 }  // namespace

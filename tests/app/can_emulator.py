@@ -1,7 +1,7 @@
 """The emulated CAN node in its own process, behind a socket instead of a bus, for the tests of driver.kind=can."""
 import sys
 
-from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
+from emulator_process import EMULATOR, REAL_TIME, EmulatorProcess, EmulatorTest
 
 
 def skip_unless_possible():
@@ -31,4 +31,4 @@ class CanTest(EmulatorTest):
 
     def real_time(self, node, *args):
         # This guardian tolerates this computer's pauses.
-        return self.start_program(*self.arguments(node, '--set', 'guardian.timeout_ms=1000', *args))
+        return self.start_program(*self.arguments(node, *REAL_TIME, '--set', 'guardian.timeout_ms=1000', *args))

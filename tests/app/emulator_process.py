@@ -1,4 +1,5 @@
 """A running abs_rig_emulator for any board, controlled by lines written into its FIFO."""
+import os
 import pathlib
 import re
 import subprocess
@@ -6,13 +7,17 @@ import subprocess
 from program import PROGRAM, ProgramTest
 
 EMULATOR = pathlib.Path(PROGRAM).parent / 'abs_rig_emulator'
+#: In real time emulator and program share a CPU: what pauses one pauses both, and neither finds the other silent.
+CPU = max(os.sched_getaffinity(0))
+REAL_TIME = ('--set', f'realtime.cpu={CPU}')
 
 
 class EmulatorProcess:
     def __init__(self, folder, *args, program=EMULATOR):
         self.control = folder / 'control'
         self.lines = []  # all of its output lines, stripped
-        self.process = subprocess.Popen([program, '--control', self.control, *map(str, args)], stdout=subprocess.PIPE,
+        cpu = () if '--lock-step' in args else ('--cpu', str(CPU))
+        self.process = subprocess.Popen([program, '--control', self.control, *cpu, *map(str, args)], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
         self.line('ready')  # "not in real time" may come before
 

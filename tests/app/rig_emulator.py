@@ -7,7 +7,7 @@ import sys
 import time
 import typing
 
-from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
+from emulator_process import EMULATOR, REAL_TIME, EmulatorProcess, EmulatorTest
 
 
 def why_not():
@@ -98,7 +98,7 @@ class RigTest(EmulatorTest):
 
     def real_time(self, emulator, *args, guardian_timeout_ms=1000):
         """A guardian that tolerates this computer's pauses: it must not end a run that only waits for the processor."""
-        return self.start_program('--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', '--set',
+        return self.start_program('--backend', 'rig', '--no-lcm', *REAL_TIME, '--set', f'driver.pci.root={emulator.root}', '--set',
                                   f'guardian.timeout_ms={guardian_timeout_ms}', *args)
 
     def wait_until_driving(self, emulator):
