@@ -107,8 +107,9 @@ class Hm2Run(EmulatorTest):
                                   'driver.kind=hm2', '--set', f'driver.hm2.address={board.address}', '--set',
                                   'guardian.timeout_ms=1000', '--set', 'realtime.cycle_gap_max_s=1')
         self.assertEqual(result.returncode, 0, result.stderr)
-        wire = json.loads(result.stdout)['wire_us']
-        self.assertGreater(wire['answers'], 900)
+        found = json.loads(result.stdout)
+        wire = found['wire_us']
+        self.assertGreater(wire['answers'], 0.5 * found['cycles'])  # not in real time, an answer may come too late
         self.assertGreater(wire['mean'], 0.0)
         self.assertEqual(board.wire(), SAFE)
         self.assertFalse([line for line in board.lines if 'outputs on' in line])
