@@ -17,8 +17,7 @@ install(TARGETS abs_controller_host RUNTIME DESTINATION ${CMAKE_INSTALL_LIBDIR}/
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/config COMPONENT runtime PATTERN udev EXCLUDE)
 install(FILES config/udev/70-abs-hil.rules DESTINATION ${ABS_HIL_UDEV_DIR} COMPONENT runtime)
 install(FILES packaging/guardian.toml DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil COMPONENT runtime)
-install(FILES packaging/systemd/abs-guardian.service packaging/systemd/abs_guardian.slice
-  DESTINATION ${ABS_HIL_SYSTEMD_DIR} COMPONENT runtime)
+install(DIRECTORY packaging/systemd/ DESTINATION ${ABS_HIL_SYSTEMD_DIR} COMPONENT runtime)
 install(FILES packaging/abs_hil.sysusers DESTINATION ${ABS_HIL_SYSUSERS_DIR} RENAME abs_hil.conf COMPONENT runtime)
 install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)

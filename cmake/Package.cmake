@@ -33,7 +33,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libabs-hil-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "abs-hil (= ${PROJECT_VERSION}), libeigen3-dev, libboost-dev, liblcm-dev, liblcm-bin, libfmt-dev, libspdlog-dev, libtomlplusplus-dev, nlohmann-json3-dev, libcli11-dev, libssl-dev, libsystemd-dev, libpugixml-dev, libzip-dev, libseccomp-dev, pkg-config")
+  "abs-hil (= ${PROJECT_VERSION}), libeigen3-dev, libboost-dev, liblcm-dev, liblcm-bin, libfmt-dev, libspdlog-dev, libtomlplusplus-dev, nlohmann-json3-dev, libcli11-dev, libssl-dev, libpugixml-dev, libzip-dev, libseccomp-dev, pkg-config")
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
   "controllers and real-time loop of abs-hil as libraries
  Headers, static libraries and CMake configuration of abs-hil, for programs

@@ -1,8 +1,7 @@
-// What the service hears of its machine: systemd's socket, sleep over logind's bus, and pauses of a virtual machine.
+// What the service hears of its machine: systemd's socket, and pauses of a virtual machine.
 #include "guardian/machine.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -21,10 +20,6 @@
 #include "driver/monotonic_time.hpp"
 #include "driver/sysfs.hpp"
 #include "runtime/realtime_setup.hpp"
-
-#ifdef ABS_HIL_HAVE_LIBSYSTEMD
-#include <systemd/sd-bus.h>
-#endif
 
 namespace abs_hil::guardian {
 
@@ -77,116 +72,6 @@ bool Event::take() const noexcept {
   return ::read(file_.get(), &count, sizeof count) == sizeof count;
 }
 
-#ifdef ABS_HIL_HAVE_LIBSYSTEMD
-
-namespace {
-
-constexpr const char* logind = "org.freedesktop.login1";
-constexpr const char* logind_path = "/org/freedesktop/login1";
-constexpr const char* logind_manager = "org.freedesktop.login1.Manager";
-
-}  // namespace
-
-/// The connection to logind and the inhibitor.
-class SleepWatch::Logind {
- public:
-  explicit Logind(SleepWatch& watch) : watch_(watch) {}
-  Logind(const Logind&) = delete;
-  Logind& operator=(const Logind&) = delete;
-  ~Logind() { ::sd_bus_unref(bus_); }
-
-  /// 0, or what failed as a negative errno.
-  int start() {
-    int result = ::sd_bus_open_system(&bus_);
-    if (result >= 0) {
-      result =
-          ::sd_bus_match_signal(bus_, nullptr, logind, logind_path, logind_manager, "PrepareForSleep", on_sleep, this);
-    }
-    return result < 0 ? result : inhibit();
-  }
-
-  /// False after the bus has gone.
-  bool process() {
-    int result = 1;
-    while (result > 0) result = ::sd_bus_process(bus_, nullptr);
-    return result == 0;
-  }
-  [[nodiscard]] int descriptor() const { return ::sd_bus_get_fd(bus_); }
-  [[nodiscard]] short events() const { return static_cast<short>(::sd_bus_get_events(bus_)); }
-  void let_sleep() { inhibitor_ = driver::FileDescriptor(-1); }
-
- private:
-  int inhibit() {
-    sd_bus_message* answer = nullptr;
-    int result = ::sd_bus_call_method(bus_, logind, logind_path, logind_manager, "Inhibit", nullptr, &answer, "ssss",
-                                      "sleep", "abs_guardian", "the rig's outputs are made safe first", "delay");
-    int fd = -1;
-    if (result >= 0) result = ::sd_bus_message_read(answer, "h", &fd);
-    if (result >= 0) inhibitor_ = driver::FileDescriptor(::dup(fd));
-    ::sd_bus_message_unref(answer);
-    return result < 0 ? result : 0;
-  }
-
-  static int on_sleep(sd_bus_message* message, void* self, sd_bus_error* /*error*/) {
-    auto& logind_watch = *static_cast<Logind*>(self);
-    int going = 0;
-    if (::sd_bus_message_read(message, "b", &going) < 0) return 0;
-    logind_watch.watch_.going_to_sleep_ = going != 0;
-    if (going == 0) static_cast<void>(logind_watch.inhibit());
-    logind_watch.watch_.happened_.signal();
-    return 0;
-  }
-
-  SleepWatch& watch_;
-  sd_bus* bus_{nullptr};
-  driver::FileDescriptor inhibitor_{-1};
-};
-
-void SleepWatch::watch(const std::stop_token& stop) {
-  runtime::keep_signals_away();
-  Logind bus(*this);
-  if (const int result = bus.start(); result < 0) {
-    tell_(std::string("no sleep inhibitor (logind: ") + std::strerror(-result) +
-          "): a suspension is noticed only after it");
-    return;
-  }
-  tell_("logind delays a suspension until the outputs are safe");
-  constexpr int look_ms = 500;
-  while (!stop.stop_requested() && bus.process()) {
-    std::array<pollfd, 2> files{pollfd{bus.descriptor(), bus.events(), 0}, pollfd{dealt_with_.descriptor(), POLLIN, 0}};
-    static_cast<void>(::poll(files.data(), files.size(), look_ms));
-    if (dealt_with_.take()) bus.let_sleep();
-  }
-  if (!stop.stop_requested()) tell_("lost logind: a suspension is noticed only after it");
-}
-
-#else
-
-void SleepWatch::watch(const std::stop_token& /*stop*/) {
-  tell_("built without libsystemd: a suspension is noticed only after it");
-}
-
-#endif
-
-SleepWatch::SleepWatch(std::function<void(const std::string&)> tell) : tell_(std::move(tell)) {
-  thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
-}
-
-Interruption SleepWatch::interruption() {
-  return {.descriptor = happened_.descriptor(),
-          .take =
-              [this] {
-                happened_.take();
-                return going_to_sleep_ ? rig::Reason::computer_will_suspend : rig::Reason::none;
-              },
-          .bars_leases =
-              [this] { return going_to_sleep_ ? std::string("the computer is about to be suspended") : std::string(); },
-          .dealt_with =
-              [this] {
-                if (going_to_sleep_) dealt_with_.signal();
-              }};
-}
-
 bool ClockLead::leapt(std::int64_t clock_s, std::int64_t monotonic_ns) noexcept {
   const std::int64_t least_ns = clock_s * ns_per_s - monotonic_ns;
   const std::int64_t most_ns = least_ns + ns_per_s;
@@ -227,16 +112,6 @@ void MachinePause::watch(const std::stop_token& stop) {
     }
     std::this_thread::sleep_for(leased_ ? milliseconds(1) : milliseconds(100));
   }
-}
-
-Interruption MachinePause::interruption() {
-  return {.descriptor = happened_.descriptor(),
-          .take =
-              [this] {
-                happened_.take();
-                return rig::Reason::none;  // the guard knows: it need only look
-              },
-          .lease_changed = [this](bool held) { leased_ = held; }};
 }
 
 }  // namespace abs_hil::guardian

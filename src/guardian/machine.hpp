@@ -3,12 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <string_view>
 #include <thread>
 
 #include "driver/file_descriptor.hpp"
-#include "guardian/talker.hpp"
 
 namespace abs_hil::guardian {
 
@@ -29,26 +27,6 @@ class Event {
 
  private:
   driver::FileDescriptor file_;
-};
-
-/// Holds logind's sleep inhibitor (mode "delay"): before the computer is suspended, the service takes the outputs back
-/// and makes them safe, and only then the inhibitor is let go. After the suspension the service looks at the board
-/// first. Works in a thread of its own; without logind it says so once and does nothing.
-class SleepWatch {
- public:
-  /// @param tell  called in the watch's thread
-  explicit SleepWatch(std::function<void(const std::string&)> tell);
-  [[nodiscard]] Interruption interruption();
-
- private:
-  class Logind;
-  void watch(const std::stop_token& stop);
-
-  std::function<void(const std::string&)> tell_;
-  Event happened_{};    ///< the computer will sleep, or has woken
-  Event dealt_with_{};  ///< the outputs are safe, or cannot be made safe
-  std::atomic<bool> going_to_sleep_{false};
-  std::jthread thread_{};
 };
 
 /// Compares a clock of whole seconds, which never stands, with one of nanoseconds, which stands while the machine is
@@ -78,8 +56,11 @@ class MachinePause {
   /// @param found  called in its thread after each pause during a lease
   explicit MachinePause(std::function<void()> found);
   [[nodiscard]] bool works() const noexcept { return clock_.get() >= 0; }
-  /// Use it only if it works. It refers to this object.
-  [[nodiscard]] Interruption interruption();
+  /// Readable after a pause, until `take`.
+  [[nodiscard]] int descriptor() const noexcept { return happened_.descriptor(); }
+  void take() const noexcept { happened_.take(); }
+  /// From now on there is a lease, or none.
+  void set_leased(bool leased) noexcept { leased_ = leased; }
 
  private:
   void watch(const std::stop_token& stop);

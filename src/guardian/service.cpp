@@ -264,7 +264,6 @@ class Service {
     });
     constexpr sched_param normal{};
     ::sched_setscheduler(0, SCHED_OTHER, &normal);
-    SleepWatch sleep(say);
     TalkerParts parts{.clock = clock_,
                       .mail = mail_,
                       .page = *page_,
@@ -283,10 +282,9 @@ class Service {
                           [told = std::string()](const std::string& text) mutable {
                             if (std::exchange(told, text) != text) tell_systemd("STATUS=" + text);
                           }};
-    parts.interruptions.push_back(sleep.interruption());
     if (pause.works()) {
       say("compares the real-time clock, to find pauses of this virtual machine");
-      parts.interruptions.push_back(pause.interruption());
+      parts.pause = &pause;
     }
     Talker talker(std::move(parts));
     static_cast<void>(mail_.order({.word = OrderWord::look}));

@@ -55,8 +55,9 @@ std::string words_of(Refusal why, const News& news) {
 
 void Talker::step(int timeout_ms) {
   parts_.page.talker_beats.fetch_add(1, std::memory_order_relaxed);
-  std::vector<pollfd> files{{parts_.listener, POLLIN, 0}, {parts_.mail.news_descriptor(), POLLIN, 0}};
-  for (const Interruption& i : parts_.interruptions) files.push_back({i.descriptor, POLLIN, 0});
+  const int pause = parts_.pause != nullptr ? parts_.pause->descriptor() : -1;
+  std::vector<pollfd> files{
+      {parts_.listener, POLLIN, 0}, {parts_.mail.news_descriptor(), POLLIN, 0}, {pause, POLLIN, 0}};
   const std::size_t first_client = files.size();
   for (const Client& client : clients_) files.push_back({client.socket.get(), POLLIN | POLLRDHUP, 0});
   if (!outbox_.empty()) timeout_ms = std::min(timeout_ms, 1);
@@ -78,12 +79,9 @@ void Talker::step(int timeout_ms) {
     if (is_silent(client) && now_ns - client.since_ns > speaks_within_ns) drop(client);
   }
   std::erase_if(clients_, [](const Client& client) { return client.gone; });
-  for (std::size_t n = 0; n < parts_.interruptions.size(); ++n) {
-    if (files[2 + n].revents == 0) continue;
-    const rig::Reason why = parts_.interruptions[n].take();
-    if (why != rig::Reason::none) order({.word = OrderWord::take_back, .reason = why});
+  if (files[2].revents != 0) {  // the guard knows of the pause; it need only look
+    parts_.pause->take();
     order({.word = OrderWord::look});
-    interrupted_ = true;
   }
   if (files[0].revents != 0) accept_clients();
   ask_guard_for_next();
@@ -188,9 +186,6 @@ std::string Talker::why_no_lease(const LeaseMessage& asked, const Peer& peer) co
     return "it keeps " + parts_.board + ", and the run wants " + rig::clean_text(asked.text, longest_shown) +
            "; name that board's service with guardian.socket, or give both the same driver.* keys";
   }
-  for (const Interruption& i : parts_.interruptions) {
-    if (const std::string why = i.bars_leases(); !why.empty()) return why;
-  }
   return {};
 }
 
@@ -254,10 +249,7 @@ void Talker::take_news(const News& news, const std::vector<driver::FileDescripto
   switch (news.word) {
     case NewsWord::board: break;
     case NewsWord::looked:
-      if (held_) break;
-      answer_safe_callers("nobody has its lease; " + outputs_text());
-      if (!std::exchange(interrupted_, false)) break;
-      for (const Interruption& i : parts_.interruptions) i.dealt_with();
+      if (!held_) answer_safe_callers("nobody has its lease; " + outputs_text());
       break;
     case NewsWord::granted: give_lease(news, pages); break;
     case NewsWord::refused:
@@ -305,7 +297,7 @@ void Talker::give_lease(const News& news, const std::vector<driver::FileDescript
     return close_holder();
   }
   held_->socket = client->socket.get();
-  for (const Interruption& i : parts_.interruptions) i.lease_changed(true);
+  if (parts_.pause != nullptr) parts_.pause->set_leased(true);
   parts_.tell("lease granted to " + held_->name);
 }
 
@@ -313,11 +305,10 @@ void Talker::end_lease(const News& news) {
   const std::string name = held_->name;
   if (Client* const holder = client_of(held_->socket)) holder->gone = true;
   held_.reset();
-  for (const Interruption& i : parts_.interruptions) i.lease_changed(false);
+  if (parts_.pause != nullptr) parts_.pause->set_leased(false);
   if (news.why != Refusal::none) parts_.tell("ended " + name + ": " + words_of(news.why, news));
   parts_.tell("lease ended: " + name);
   answer_safe_callers("ended the lease of " + name);
-  if (interrupted_) order({.word = OrderWord::look});
 }
 
 }  // namespace abs_hil::guardian

@@ -8,6 +8,7 @@
 
 #include "driver/file_descriptor.hpp"
 #include "guardian/lease_wire.hpp"
+#include "guardian/machine.hpp"
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
 #include "runtime/clock.hpp"
@@ -23,19 +24,6 @@ struct LeaseTerms {
   std::function<void(const SharedRecorder&, const GuardianReport&, const std::string& account)> write_record{};
 };
 
-/// Something outside of the runs that the service must attend to: a suspension, a pause of the machine.
-struct Interruption {
-  int descriptor{-1};  ///< readable when it happens
-  /// Reads the descriptor. Returns why a lease must end; `none`: nothing but a new look at the board is needed.
-  std::function<rig::Reason()> take;
-  /// Called when a lease is granted and when it has ended.
-  std::function<void(bool held)> lease_changed{[](bool) {}};
-  /// Why nobody gets a lease at present; empty: no objection.
-  std::function<std::string()> bars_leases{[] { return std::string(); }};
-  /// Called once nobody has a lease and the board was made safe, or could not be.
-  std::function<void()> dealt_with{[] {}};
-};
-
 struct TalkerParts {
   runtime::Clock& clock;
   Mail& mail;
@@ -46,7 +34,7 @@ struct TalkerParts {
   std::function<Peer(int socket, int pidfd)> identify;
   /// Reads a launch config. Throws std::exception if it cannot be guarded.
   std::function<LeaseTerms(const std::string& launch_config_json, const Peer& client)> read_terms;
-  std::vector<Interruption> interruptions{};
+  MachinePause* pause{nullptr};                    ///< null: none can be found here
   runtime::Scheduling scheduling{};                ///< of the guard
   std::string shortcomings{};                      ///< what the guard could not obtain of the real-time set-up
   std::function<void(const std::string&)> tell;    ///< a line for the log
@@ -118,7 +106,6 @@ class Talker {
   std::optional<HeldLease> held_{};
   News latest_{};
   bool knows_board_{false};
-  bool interrupted_{false};
 };
 
 }  // namespace abs_hil::guardian

@@ -20,6 +20,7 @@ for plant in paper-table1 paper-timing inteco-manual; do
   [ -f "usr/share/abs_hil/config/plants/$plant.toml" ] || { echo "$plant.toml is not installed"; exit 1; }
 done
 for file in share/abs_hil/guardian.toml lib/systemd/system/abs-guardian.service lib/systemd/system/abs_guardian.slice \
+  lib/systemd/system/sleep.target.wants/abs-guardian-sleep.service \
   lib/udev/rules.d/70-abs-hil.rules; do
   [ -f "usr/$file" ] || { echo "$file is not installed"; exit 1; }
 done

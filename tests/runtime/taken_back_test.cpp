@@ -21,10 +21,10 @@ TEST_CASE("a cycle that finds the guardian's mark sends the safe command and end
   bench.executive.set_watch(heartbeat);
   bench.cycle();
   CHECK(bench.driver.written.back().brake_duty == 0.5);
-  guard.taken_back_for.store(rig::Reason::computer_will_suspend);
+  guard.taken_back_for.store(rig::Reason::machine_paused);
   CHECK_FALSE(bench.cycle());
   CHECK(rig::acts(bench.driver.written.back()) == false);
-  CHECK(bench.logic.ended_by == rig::Reason::computer_will_suspend);
+  CHECK(bench.logic.ended_by == rig::Reason::machine_paused);
 }
 
 TEST_CASE("after a pause of the whole computer the pause is the reason, not the mark that it led to") {

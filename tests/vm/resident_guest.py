@@ -45,8 +45,7 @@ def install(card):
     """What the package installs: the programs, the unit and its configuration."""
     for name in ('abs_hil', 'abs_hil_program', 'abs_guardian'):
         pathlib.Path('/usr/local/bin', name).symlink_to(pathlib.Path(PROGRAM).resolve().parent / name)
-    for unit in ('abs-guardian.service', 'abs_guardian.slice'):
-        shutil.copy(ROOT / 'packaging/systemd' / unit, '/etc/systemd/system')
+    shutil.copytree(ROOT / 'packaging/systemd', '/etc/systemd/system', symlinks=True, dirs_exist_ok=True)
     pathlib.Path('/etc/abs_hil').mkdir()
     pathlib.Path('/etc/abs_hil/guardian.toml').write_text(
         (ROOT / 'packaging/guardian.toml').read_text() + f'root = "{card}"\n')
@@ -253,7 +252,7 @@ def suspension(emulator):
         return problems
     test.write_text('freezer')
     pathlib.Path('/sys/module/suspend/parameters/pm_test_delay').write_text('1')
-    problems += ended_by_service(emulator, 'asked for a suspension', suspend, 'the computer is about to be suspended')
+    problems += ended_by_service(emulator, 'asked for a suspension', suspend, 'the resident guardian was told to end')
     said = run('journalctl', '--no-pager', '--output=short-monotonic', '--identifier=kernel', '--grep=PM: suspend').stdout
     entries = re.findall(r'\[ *([\d.]+)\].*suspend entry', said)
     zero_s = (emulator.widths().zero_since_ns or 0) * 1e-9
@@ -263,7 +262,11 @@ def suspension(emulator):
         problems.append(f'a suspension: it began at {entries[-1]} s, the outputs were zero since {zero_s} s only')
     else:
         print(f'a suspension: the outputs were zero {1000 * (float(entries[-1]) - zero_s):.1f} ms before it', flush=True)
-    one = Run(emulator)  # the service goes on after it
+    deadline_s = time.monotonic() + 10  # the unit of sleep starts it again
+    while run('systemctl', 'is-active', SERVICE, check=False).stdout.strip() != 'active':
+        if time.monotonic() > deadline_s:
+            return [*problems, 'after the suspension: nobody has started the service again']
+    one = Run(emulator)
     one.wait_until_driven()
     one.end()
     return problems if wait_for_zero(emulator) else [*problems, 'after the suspension: the card holds']

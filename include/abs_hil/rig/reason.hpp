@@ -195,7 +195,6 @@ enum class ReplayFinds : std::uint8_t {
       "the controller closed its connection to the resident guardian while it had the outputs")                       \
   ROW(guardian_paused, 251, fault, no,                                                                                \
       "the guardian was kept from running for twice guardian.timeout_ms: it took the outputs back")                   \
-  ROW(computer_will_suspend, 252, fault, no, "the computer is about to be suspended")                                 \
   ROW(machine_paused, 253, fault, no,                                                                                 \
       "the virtual machine was paused: the board's clock ran on while this computer stood still")                     \
   ROW(guardian_told_to_end, 254, fault, no, "the resident guardian was told to end")                                  \
