@@ -28,7 +28,7 @@ SERVICE = 'abs-guardian.service'
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CGROUPS = pathlib.Path('/sys/fs/cgroup')
 PLANT = ('plant.slip_regularisation_m_s=0.1',)  # not stiff at rest: ten times fewer steps for the emulator
-EXPERIMENT = ('experiment.idle_s=0.02', 'experiment.cut_speed_rad_s=10', 'experiment.coast_s=0.02',
+EXPERIMENT = ('experiment.idle_s=0.02', 'experiment.coast_s=0.02',
               'experiment.end_speed_m_s=0.3', 'experiment.hold_torque_Nm=0.3')
 jitter = random.Random(19)
 
@@ -63,7 +63,7 @@ class Run:
     """abs_hil in a scope of its own."""
     number = 0
 
-    def __init__(self, emulator, *before):
+    def __init__(self, emulator, *before, cut_speed_rad_s=10):
         Run.number += 1
         self.emulator = emulator
         self.folder = pathlib.Path(tempfile.mkdtemp())
@@ -71,7 +71,8 @@ class Run:
         self.process = subprocess.Popen(
             ['systemd-run', '--scope', '--quiet', '--collect', f'--unit={self.scope}', *before, PROGRAM, '--backend',
              'rig', '--no-lcm', '--no-out', '--rt', 'require', '--rate', str(RATE_HZ), '--recorder', self.folder,
-             *settings((f'driver.pci.root={emulator.root}', 'guardian.resident=require', *EXPERIMENT))],
+             *settings((f'driver.pci.root={emulator.root}', 'guardian.resident=require', *EXPERIMENT,
+                         f'experiment.cut_speed_rad_s={cut_speed_rad_s}'))],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
     def group(self):
@@ -221,9 +222,9 @@ def service_dies_too(emulator):
     return []
 
 
-def ended_by_service(emulator, way, act, words):
+def ended_by_service(emulator, way, act, words, **run):
     """The service takes the outputs back; the run ends with status 1."""
-    one = Run(emulator)
+    one = Run(emulator, **run)
     one.wait_until_driven()
     before_ns = time.monotonic_ns()
     act()
@@ -252,8 +253,13 @@ def suspension(emulator):
         return problems
     test.write_text('freezer')
     pathlib.Path('/sys/module/suspend/parameters/pm_test_delay').write_text('1')
-    problems += ended_by_service(emulator, 'asked for a suspension', suspend, 'the resident guardian was told to end')
-    said = run('journalctl', '--no-pager', '--output=short-monotonic', '--identifier=kernel', '--grep=PM: suspend').stdout
+    problems += ended_by_service(emulator, 'asked for a suspension', suspend, 'the resident guardian was told to end',
+                                 cut_speed_rad_s=150)  # systemd takes its time; the run must last longer
+    said, deadline_s = '', time.monotonic() + 20
+    while 'suspend exit' not in said and time.monotonic() < deadline_s:  # systemd suspends after it has stopped the service
+        time.sleep(0.1)
+        said = run('journalctl', '--no-pager', '--output=short-monotonic', '--identifier=kernel', '--grep=PM: suspend',
+                   check=False).stdout
     entries = re.findall(r'\[ *([\d.]+)\].*suspend entry', said)
     zero_s = (emulator.widths().zero_since_ns or 0) * 1e-9
     if not entries:
@@ -262,7 +268,7 @@ def suspension(emulator):
         problems.append(f'a suspension: it began at {entries[-1]} s, the outputs were zero since {zero_s} s only')
     else:
         print(f'a suspension: the outputs were zero {1000 * (float(entries[-1]) - zero_s):.1f} ms before it', flush=True)
-    deadline_s = time.monotonic() + 10  # the unit of sleep starts it again
+    deadline_s = time.monotonic() + 20  # the unit of sleep starts it again
     while run('systemctl', 'is-active', SERVICE, check=False).stdout.strip() != 'active':
         if time.monotonic() > deadline_s:
             return [*problems, 'after the suspension: nobody has started the service again']
