@@ -203,8 +203,8 @@ def test_sensitivities_are_those_of_the_simulated_log(logs):
         if p.key == 'u0':
             continue
         h = 1e-4 * scale[i]
-        ends = [_core.trajectory(problem.base, problem.plant_values({**values, p.key: values[p.key] + sign * h}, 0), inputs,
-                                 piece.states[0])[:, :2] for sign in (1, -1)]
+        ends = [_core.trajectory(problem.base, problem.simulated(0, {**values, p.key: values[p.key] + sign * h})[0],
+                                 inputs, piece.states[0])[:, :2] for sign in (1, -1)]
         expected = (ends[0] - ends[1]) / (2e-4)
         found = piece.linear['by_parameter'][:len(expected) - 1, :, i]
         np.testing.assert_allclose(found, expected[:-1], rtol=2e-3, atol=2e-6)

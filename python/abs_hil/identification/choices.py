@@ -1,22 +1,27 @@
-"""What of the model the logs ask for: the form of tyre and load, a limit of the brake's rate, a delay of the board's inputs."""
+"""What of the model the logs ask for: the form of tyre and load, a limit of the brake's rate, a delay of the board's inputs, the
+steps of its duties."""
 import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from .brake_flaws import brake_torques, static_torques
-from .fit import ROUNDS, finish_fit, other_costs
-from .linear import keep_normals, left_out_cost, linearise, run_filter, solved, step, to_rest
+from .fit import COMPARED, LEVELS, descend, finish_fit, other_costs
+from .linear import keep_normals, left_out_cost, linearise, run_filter, solved, to_rest
 from .logs import Log
-from .parameters import DELAY, RATE_LIMIT
-from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit
+from .parameters import DELAY, FLAWS, RATE_LIMIT
+from .problem import QUIET, Disturbances, Fit
 
 #: a delay is believed if it is this many standard deviations from 0
 SURE_DELAY = 6.0
 LARGEST_DELAY_S = 0.02
-#: a difference of -2 log likelihood that decides between the forms, and one that does so at first values already
+#: a difference of -2 log likelihood that decides between the forms, and one that does so above the level that compares them
 CLEAR_DIFFERENCE = 500.0
 CLEAR_AT_FIRST = 5000.0
+#: no form that rests is given up at larger disturbances: they hide what it lacks
+FIRST_COMPARED = 0.01
+#: of boards with PWMs of 8, 10 and 12 bit
+PWM_STEPS = (255, 1023, 4095)
 #: a limit is believed if it lowers -2 log likelihood by this
 CLEAR_GAIN = 50.0
 #: its standard deviation over its value, at most
@@ -28,37 +33,66 @@ WORTH_A_LOOK = 3.0
 
 
 def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
-                notes: list[str]) -> tuple[Fit, bool]:
-    """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
-    are enough if they show a clear difference already. False: the logs do not tell, and the form is the start's."""
-    costs = [left_out_cost(fit) for fit in fits]
-    if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
-        for number, fit in enumerate(fits):
-            for _ in range(2):
-                step(fit, ROUNDS[1][0], check)
-            costs[number] = left_out_cost(fit)
-        follow = [_follows(fit, check) for fit in fits] if abs(costs[0] - costs[1]) > CLEAR_DIFFERENCE else []
-        if sum(follow) == 1:
-            best = follow.index(True)
-            notes.append(f'form: {fits[best].problem.form.meaning}; it alone follows the logs to the steps of the counts')
-            return fits[best], True
-    for fit, cost in zip(fits, costs):
+                notes: list[str]) -> tuple[list[Fit], bool]:
+    """Takes all forms down to COMPARED side by side. Those that are left, first the one that better predicts each log from all the
+    others, by the likelihood: one that is clearly worse than another that rests is given up. False: the logs do not tell, and the
+    form is the start's."""
+    left = list(fits)
+    for sd in LEVELS[1:LEVELS.index(COMPARED) + 1]:
+        tried = [(*_lowered(fit, sd, check), fit) for fit in left]
+        rests, best, _ = min(tried, key=lambda one: one[1])
+        tried = [one for one in tried if not rests or one[1] < best + CLEAR_AT_FIRST or (one[0] and sd > FIRST_COMPARED)]
+        left = [fit for _, _, fit in sorted(tried, key=lambda one: one[1])]
+        for fit in left if sd == FIRST_COMPARED else ():
+            fit.above = fit.copy()
+    costs = sorted(cost for _, cost, _ in tried)
+    for fit, cost in zip(left, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
-    best = int(np.argmin(costs))
-    starts = [i for i, fit in enumerate(fits) if fit.problem.form.name == start_form]
-    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE and starts:
-        return fits[starts[0]], False
-    notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
-                 f'{abs(costs[0] - costs[1]):.3g})')
-    return fits[best], True
+    first, others, why = left[0], left[1:], 'it predicts left-out logs better'
+    if others and costs[-1] - costs[0] <= CLEAR_DIFFERENCE:
+        return sorted(left, key=lambda fit: fit.problem.form.name != start_form), False
+    follow = [fit for fit in left if _follows(fit, check)] if others else []
+    if len(follow) == 1:
+        first, others, why = follow[0], [], 'it alone follows the logs to the steps of the counts'
+    if len(fits) > 1:
+        notes.append(f'form: {first.problem.form.meaning}; {why}')
+    return [first, *others], True
+
+
+def _lowered(fit: Fit, sd: float, check: Callable[[], None]) -> tuple[bool, float]:
+    """Whether the form rests at this level, and its cost: infinite where it leads to a plant that cannot be."""
+    try:
+        return descend(fit, [sd], check), left_out_cost(fit)
+    except (ValueError, np.linalg.LinAlgError):
+        return False, np.inf
 
 
 def _follows(fit: Fit, check: Callable[[], None]) -> bool:
     """Whether nothing but the steps of the counts is left between the logs and this form."""
     try:
-        return finish_fit(fit.copy(), check).rms_counts <= LARGEST_QUIET_RMS
+        return finish_fit(fit.copy(), check, COMPARED).follows
     except (ValueError, np.linalg.LinAlgError):
         return False
+
+
+def with_steps(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
+    """The fit to duties as a board would have given them, which the logs hold as they were asked for. Believed only if nothing but
+    the counts' steps is left then: on a rig that the plant does not describe, any other duties may be likelier."""
+    duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
+    for steps in PWM_STEPS[::-1]:
+        if np.abs(duties * steps - np.rint(duties * steps)).max() < 1e-5:
+            continue
+        # A half rounds up, as on the board, whatever the last digit of the log's.
+        logs = [dataclasses.replace(log, **{name: np.floor(getattr(log, name) * steps + 0.5 + 1e-6) / steps
+                                            for name in ('brake_pwm', 'motor_pwm')}) for log in fit.problem.logs]
+        other = fit.copy(problem=dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps), moved=None)
+        try:
+            if descend(other, [COMPARED], check) and (other := finish_fit(other, check, 3.2e-4)).follows:
+                say(f'duties of {steps} steps')
+                return other
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+    return fit
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
@@ -112,6 +146,19 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     return fit
 
 
+def idle_flaws(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
+    """The fit without flaws that its logs show no longer, as a dead time of the first values that went to 0."""
+    sd = np.sqrt(np.diag(fit.covariance())) * fit.scale
+    idle = [flaw.key for flaw in FLAWS if flaw.key in fit.problem.flaws
+            and abs(fit.values[flaw.key] - flaw.none) <= SURE_DELAY * sd[fit.keys.index(flaw.key)]]
+    if not idle:
+        return fit
+    fit = fit.changed({}, flaws=tuple(key for key in fit.problem.flaws if key not in idle))
+    fit.values = {key: value for key, value in fit.values.items() if key not in idle}
+    to_rest(fit, fit.disturbances, 4, check)
+    return fit
+
+
 def without(fit: Fit) -> Fit:
     """A copy of the fit in which the lag alone holds the brake's torque back."""
     if not fit.problem.with_rate_limit:
@@ -128,7 +175,7 @@ def with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) 
     if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:
         return fit
     to_rest(late, QUIET, 8, check)
-    if late.rms_counts > LARGEST_QUIET_RMS:
+    if not late.follows:
         return fit
     say(f'the inputs act {1e3 * late.values[DELAY]:.3g} ms late')
     return late

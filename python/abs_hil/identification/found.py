@@ -52,7 +52,7 @@ class Estimate:
 class Identified:
     """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell; misfit: why the
     logs give no model of the plant, empty if they do; undecided: they do not tell the form of the tyre, or their tyre is
-    of no form; wanted: those notes that say what to run."""
+    of no form; refused: its values are those of no rig; wanted: those notes that say what to run."""
     form: str
     start: str
     parameters: dict[str, Estimate]
@@ -68,6 +68,7 @@ class Identified:
     interrupted: bool = False
     misfit: str = ''
     undecided: bool = False
+    refused: bool = False
     wanted: list[str] = field(default_factory=list)
 
     def values(self) -> dict[str, float]:
@@ -78,15 +79,15 @@ class Identified:
 @dataclass
 class Finished:
     """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
-    discs that no log shows, what the disturbances have in common that the plant lacks, what small ones had that these took up,
-    and -2 log likelihood with small disturbances and the surest of those causes."""
+    discs that no log shows, what the disturbances have in common that the plant lacks, why the logs give no model, and
+    -2 log likelihood with small disturbances and the surest of those causes."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
     disturbances: Disturbances | None
     round_discs: dict[str, float]
     causes: list[structure.Found] = field(default_factory=list)
-    hidden: list[structure.Found] = field(default_factory=list)
+    misfit: str = ''
     cost: float = 0.0
 
 
@@ -104,7 +105,7 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
 
 def refuse(found: Identified, why: str, of_logs: list[str], undecided: bool) -> None:
     """The logs do not fit the plant: the values are the last ones of the fit, and nothing is promised of them."""
-    found.misfit, found.undecided = why, undecided
+    found.misfit, found.undecided, found.refused = why, undecided, True
     found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written',
                       *(note for note in of_logs if not (undecided and note.startswith('form: '))),
                       *(note for note in found.wanted if all(log.experiment for log in found.logs) and 'among the' not in note)]
@@ -167,6 +168,8 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     for wheel, slots in problem.slots.items():
         parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate.normal(slots.error_counts, slots.sd_counts, '1')
         notes.append(f'every second edge of the {wheel} encoder comes late by {slots.error_counts:.2g} of a count')
+    if problem.pwm_steps:
+        notes.append(f"the board gives duties in {problem.pwm_steps} steps; the logs' own were rounded to them before the fit")
     if problem.jitter_s > 0.0:
         notes.append(f'the encoders were read {1e6 * problem.jitter_s:.2g} us early or late (standard deviation); the intervals '
                      'count with it, and would be narrower with the true times in a column sample_time_s')

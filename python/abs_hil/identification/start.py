@@ -4,11 +4,14 @@ With F eliminated from (1) and (2), over an interval of time,
 
     (J1/r1) dw1 + (J2/r2) dw2 = int [ Tm/r2 - (d1 w1 + M10 s1 + Tb)/r1 - (d2 w2 + M20)/r2 ] dt
 
-which is linear but for u0 and c31; these two are scanned. While the wheels are apart, each has an equation of its own.
-The tyre's parameters then fit the force that the lower wheel felt.
+with inertias J (kg m^2), radii r (m), speeds w (rad/s), bearings d (N m s/rad) and M (N m), s = 0 where a wheel stands, motor and
+brake torques Tm and Tb (N m). It is linear but for u0, c31 and the brake's dead time. While the wheels are apart, each has an
+equation of its own. The stages follow each other, and each begins with what the last one knows and how well: bearings from
+wheels that turn freely, the motor, and the brake, whose u0, c31 and dead time are scanned. The tyre's parameters then fit the
+force that the lower wheel felt. What no log tells keeps the start's value.
 """
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +19,24 @@ import scipy.optimize
 import scipy.signal
 
 from ..core import _core
-from .brake_flaws import brake_torques
+from .brake_flaws import brake_torques, with_flaws
 from .logs import Log
+from .parameters import DEAD_TIME
 from .problem import Problem
 
 INTERVAL_S = 0.04
 COARSE_S = 0.004
 #: of the brake's line, as a share of the start's: a brake with less did not act
 LEAST_SLOPE = 0.05
+#: a dead time is believed at first if it takes this share off the cost without one; less is found later
+WORTH_DEAD = 0.3
+LARGEST_DEAD_S = 0.04
+#: of the start's values, over their size
+START_SD = 0.5
+#: the speeds' errors stand in the columns, too, and draw towards 0 what little else tells: the rows count for less by this factor
+DOUBT = 10.0
+#: after a braking, so long a wheel rolls freely, s
+RESTS_S = 0.3
 
 
 @dataclass
@@ -62,18 +75,18 @@ def _pieces(problem: Problem) -> _Pieces:
 
 def first_values(problem: Problem, start: Mapping[str, float],
                  other_form: Mapping[str, float] | None = None) -> dict[str, float]:
-    """First values of the form's parameters. `start` fills what the logs do not tell; `other_form`: first values of another
-    form, from the same logs: all but the tyre's hold here, too."""
+    """First values of the form's parameters, and of the brake's dead time where the logs show one. `start` fills what they do not
+    tell; `other_form`: first values of another form, from the same logs: all but the tyre's hold here, too."""
     pieces = _pieces(problem)
     value = {p.key: float(start[p.key]) for p in problem.form.parameters}
     value.update(problem.fixed)
     if other_form is not None:
-        value.update({key: number for key, number in other_form.items() if key in value})
+        value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
         _tyre(value, pieces, problem)
         return value
     if 'r1_m' not in problem.fixed:
         rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
-        for rest_s in (1.0, 0.3):  # after a locked wheel, rolling takes its time
+        for rest_s in (1.0, RESTS_S):  # after a locked wheel, rolling takes its time
             rolling = rolls & ~_braked(pieces, problem.logs, rest_s)
             if rolling.sum() > 3:
                 value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
@@ -118,11 +131,13 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
     coarse = [(0.5 * np.diff(log.time_s[::k]), log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
               for log, motion, k in zip(logs, problem.motions, thin)]
 
-    def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
+    def brake_columns(u0: float, c31: float, dead_s: float) -> tuple[np.ndarray, np.ndarray]:
         slopes: list[np.ndarray] = []
         offsets: list[np.ndarray] = []
         for number, first, last in pieces.parts:
             half_s, duty, turning, k = coarse[number]
+            if late := round(dead_s / (k * logs[number].period_s)):
+                duty = np.concatenate([np.zeros(late), duty[:-late]])
             active = (duty >= u0) & (duty > 0)
             keeps = float(np.exp(-c31 * k * logs[number].period_s))
             for into, static in ((slopes, np.where(active, duty, 0.0)), (offsets, active.astype(float))):
@@ -140,49 +155,71 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
     friction1 = {'d1_Nms_rad': pieces.angle[:, 0], 'M10_Nm': turning1, 'J1_kg_m2': pieces.dw[:, 0]}
     friction2 = {'d2_Nms_rad': pieces.angle[:, 1], 'M20_Nm': turning2, **{k: -v for k, v in motor.items()}}
     parts = ((usable, r2 / r1, 1.0), (upper, 1.0, 0.0), (lower, 0.0, 1.0))
+    of_row = np.concatenate([np.flatnonzero(rows) for rows, _, _ in parts])
     unbraked = np.concatenate([np.stack([upper_by * friction1.get(key, zero) + lower_by * friction2.get(key, zero)
                                          for key in _LINEAR], axis=1)[rows] for rows, upper_by, lower_by in parts])
     target = np.concatenate([-lower_by * J2 * pieces.dw[rows, 1] for rows, _, lower_by in parts])
+    brakes = np.concatenate([upper_by * np.ones(rows.sum()) for rows, upper_by, _ in parts])
+    driven, braked = pieces.motor[of_row] > 0.0, _braked(pieces, logs, RESTS_S)[of_row]
 
-    # What the logs do not tell stays near the start: a weak pull, in the size of each parameter.
+    # What the logs do not tell stays near the start: that is as good as a reading of each parameter.
     emf = value['motor_stall_torque_Nm'] / value['motor_no_load_speed_rad_s']
     guess = np.array([{**value, 'back_emf': emf}[key] for key in _LINEAR])
     free = [i for i, key in enumerate(_LINEAR) if key not in fixed]
     sizes = np.maximum(np.abs(guess), [_FLOORS.get(key, 1e-6) for key in _LINEAR])[free]
-    pull = 0.02 * np.median(np.abs(pieces.duration)) / (5.0 * sizes)
+    pull = np.diag(1.0 / (START_SD * sizes))
+    pulls_to = pull @ guess[free]
+    target = target - np.delete(unbraked, free, axis=1) @ np.delete(guess, free)  # the brake's columns are still 0
+    for rows in (~driven & ~braked, driven & ~braked):
+        if rows.any():
+            pull, pulls_to = _robust(unbraked[rows][:, free], target[rows], pull, pulls_to)[2:]
 
-    def fit(u0: float, c31: float) -> tuple[float, np.ndarray]:
-        A, y = unbraked.copy(), target
-        for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31)):
-            A[:, _LINEAR.index(key)] = np.concatenate([upper_by * column[rows] for rows, upper_by, _ in parts])
-        for i in sorted({*range(len(_LINEAR))} - {*free}):
-            y = y - A[:, i] * guess[i]
+    def fit(u0: float, c31: float, dead_s: float = 0.0) -> tuple[float, np.ndarray]:
+        A, y = unbraked[braked], target[braked]
+        for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31, dead_s)):
+            A[:, _LINEAR.index(key)] = (brakes * column[of_row])[braked]
+            if key in fixed:
+                y = y - A[:, _LINEAR.index(key)] * fixed[key]
         full = guess.copy()
-        full[free], cost = _robust(A[:, free], y, np.diag(pull), pull * guess[free])
+        full[free], cost, *_ = _robust(A[:, free], y, pull, pulls_to)
         return cost, full
 
     u0s, c31s = [value['u0']], [value['c31_per_s']]
-    best = np.inf, guess, value['u0'], value['c31_per_s']
+    best = *fit(value['u0'], value['c31_per_s']), value['u0'], value['c31_per_s'], 0.0
     if 'c31_per_s' not in fixed and len(duties):
-        c31s = list(np.geomspace(4.0, 100.0, 12))
+        c31s = list(np.geomspace(4.0, 400.0, 16))
     if 'u0' not in fixed and len(duties):
         u0s = sorted({float(u) for u in np.quantile(duties, np.linspace(0, 1, 24))} | {float(duties[0])})
-    for round_number in range(3):
-        for u0, c31 in itertools.product(u0s, c31s):
-            cost, found = fit(u0, c31)
+
+    def scan(u0s: Iterable[float], c31s: Iterable[float], deads_s: Iterable[float]) -> None:
+        nonlocal best
+        for u0, c31, dead_s in itertools.product(u0s, c31s, deads_s):
+            cost, found = fit(u0, c31, dead_s)
             if cost < best[0]:
-                best = cost, found, u0, c31
-        if len(c31s) > 1:
-            c31s = list(best[3] * np.geomspace(*((0.93, 1.07) if round_number else (0.8, 1.25)), 5))
-        if len(u0s) > 1:
-            width = (duties[-1] - duties[0]) / 24 / (4 ** round_number)
-            near = duties[(duties > best[2] - width) & (duties < best[2] + width)]
-            u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
+                best = cost, found, u0, c31, dead_s
+
+    def near(u0: float, width: float) -> list[float]:
+        some = duties[(duties > u0 - width) & (duties < u0 + width)] if len(u0s) > 1 else np.array([u0])
+        return sorted({float(u) for u in np.quantile(some, np.linspace(0, 1, 6))} | {u0}) if len(some) else [u0]
+
+    several, span = len(c31s) > 1, float(np.ptp(duties)) / 24 if len(duties) else 0.0
+    for round_number in range(3):
+        scan(u0s if round_number == 0 else near(best[2], span / 4**(round_number - 1)), c31s, [0.0])
+        c31s = list(best[3] * np.geomspace(*((0.93, 1.07) if round_number else (0.8, 1.25)), 5)) if several else c31s
+    if several:
+        instant = best
+        scan([best[2]], np.geomspace(8.0, 600.0, 8), np.arange(COARSE_S, LARGEST_DEAD_S, COARSE_S))
+        if best[0] < (1.0 - WORTH_DEAD) * instant[0]:
+            scan(near(best[2], span), best[3] * np.geomspace(0.7, 1.4, 5), best[4] + COARSE_S * np.arange(-1, 2))
+        else:
+            best = instant
+    if best[4] > 0.0 and best[1][_LINEAR.index('b2_Nm')] < 0.0:
+        value[DEAD_TIME.key] = float(best[4])
     linear = dict(zip(_LINEAR, best[1]))
     # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
-    brakes = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
+    acted = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
     for key in _LINEAR:
-        if key in value and key not in fixed and (brakes or key not in ('b1_Nm', 'b2_Nm')):
+        if key in value and key not in fixed and (acted or key not in ('b1_Nm', 'b2_Nm')):
             value[key] = float(linear[key])
     for key, floor in _FLOORS.items():
         if key not in fixed:
@@ -191,28 +228,30 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
         value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
     if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
         value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / linear['back_emf'], 20, 2000))
-    if 'u0' not in fixed and brakes:
+    if 'u0' not in fixed and acted:
         value['u0'] = best[2]
-    if 'c31_per_s' not in fixed and brakes:
+    if 'c31_per_s' not in fixed and acted:
         value['c31_per_s'] = best[3]
 
 
-def _robust(A: np.ndarray, y: np.ndarray, A_pull: np.ndarray, y_pull: np.ndarray) -> tuple[np.ndarray, float]:
-    """Least squares that forgives outliers (Huber's weights); the cost is robust too."""
-    weight = np.ones(len(y))
-    found = np.zeros(A.shape[1])
-    scale = 1.0
-    for _ in range(4):
-        root = np.sqrt(weight)[:, None]
-        stacked, target = np.concatenate([A * root, A_pull]), np.concatenate([y * root[:, 0], y_pull])
+def _robust(A: np.ndarray, y: np.ndarray, pull: np.ndarray,
+            pulls_to: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+    """Least squares that forgives outliers (Huber's weights), with rows of unit variance that others left, pull x = pulls_to; the
+    cost is robust too. The last two are such rows for the next."""
+    found = np.linalg.solve(pull, pulls_to)
+    for number in range(5):
+        residual = np.abs(y - A @ found)
+        scale = 1.0
+        if len(y):
+            scale = 1e-12 + float(1.4826 * np.median(residual) if number else np.sqrt(np.mean(residual**2)))
+        root = np.sqrt(np.minimum(1.0, 2.0 * scale / np.maximum(residual, 1e-15))) / (DOUBT * scale)
+        stacked, target = np.concatenate([A * root[:, None], pull]), np.concatenate([y * root, pulls_to])
         size = np.linalg.norm(stacked, axis=0)
         size[size == 0] = 1.0
         found = np.linalg.lstsq(stacked / size, target, rcond=None)[0] / size
-        residual = y - A @ found
-        scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
-        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(residual), 1e-15))
-    limit = 0.02
-    return found, float(np.sum(np.minimum(residual**2, limit * np.abs(residual))))
+    residual, limit = np.abs(y - A @ found), 0.02
+    left, triangle = np.linalg.qr(stacked)
+    return found, float(np.sum(np.minimum(residual**2, limit * residual))), triangle, left.T @ target
 
 
 def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
@@ -227,18 +266,26 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
              - value['M20_Nm'] * pieces.turning[:, 1]) / (r2 * pieces.duration)
     middles = []
     for number, first, last in pieces.parts:
-        motion = problem.motions[number]
-        at_rows = np.column_stack([np.where(motion.stands, 0.0, motion.speed_rad_s), brake_torques(problem.logs[number], value)])
-        middles.append(at_rows[(first + last) // 2])
+        log, motion = problem.logs[number], problem.motions[number]
+        torque = brake_torques(*with_flaws(log, motion, value))
+        middles.append(np.column_stack([np.where(motion.stands, 0.0, motion.speed_rad_s), torque])[(first + last) // 2])
     w1, w2, Tb = np.concatenate(middles)[contact].T
     force = force[contact]
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
-    lows = np.array([max(p.least, 1e-2 * value[p.key]) for p in tyre])
-    highs = np.array([min(p.most, 1e2 * value[p.key]) for p in tyre])
-    x_start = np.log([value[p.key] for p in tyre])
+    begun = np.array([value[p.key] for p in tyre])
+    line = np.array([p.least < 0.0 for p in tyre])  # moves along a straight line, the others by factors
+    lows = np.array([max(p.least, at - 0.5 if along else 1e-2 * at) for p, at, along in zip(tyre, begun, line)])
+    highs = np.array([min(p.most, at + 0.5 if along else 1e2 * at) for p, at, along in zip(tyre, begun, line)])
+
+    def to_x(values: np.ndarray) -> np.ndarray:
+        return np.where(line, 10.0 * values, np.log(np.where(line, 1.0, values)))
+
+    def from_x(x: np.ndarray) -> np.ndarray:
+        return np.clip(np.where(line, 0.1 * x, np.exp(np.where(line, 0.0, x))), lows, highs)
+    x_start = to_x(begun)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        values = np.clip(np.exp(x), lows, highs)
+        values = from_x(x)
         try:
             modelled = _core.tyre_forces_N(base, shared + list(zip([p.key for p in tyre], values.tolist())), w1, w2, Tb)
         except ValueError:  # this friction would wedge the lever
@@ -248,10 +295,10 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
 
     fits = []
     for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes
-        x0 = np.log([np.clip(value[p.key] * (factor if p.key in form.road else 1.0), 1.05 * low, 0.9 * high)
-                     for p, low, high in zip(tyre, lows, highs)])
-        fits.append(scipy.optimize.least_squares(residual, x0, bounds=(np.log(lows), np.log(highs)), loss='soft_l1',
+        heights = np.array([factor if p.key in form.road and not along else 1.0 for p, along in zip(tyre, line)])
+        x0 = to_x(np.where(line, begun, np.clip(begun * heights, 1.05 * lows, 0.9 * highs)))
+        fits.append(scipy.optimize.least_squares(residual, x0, bounds=(to_x(lows), to_x(highs)), loss='soft_l1',
                                                  f_scale=1.0, max_nfev=60))
     best = min(fits, key=lambda fit: fit.cost)
-    for p, number in zip(tyre, np.clip(np.exp(best.x), lows, highs)):
+    for p, number in zip(tyre, from_x(best.x)):
         value[p.key] = float(number)
