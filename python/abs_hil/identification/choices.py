@@ -1,16 +1,16 @@
 """What of the model the logs ask for: the form of tyre and load, a limit of the brake's rate, a delay of the board's inputs, the
 steps of its duties."""
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from .brake_flaws import brake_torques, static_torques
-from .fit import COMPARED, LEVELS, descend, finish_fit, other_costs
+from .fit import COMPARED, LEVELS, descend, other_costs
 from .linear import keep_normals, left_out_cost, linearise, run_filter, solved, to_rest
 from .logs import Log
 from .parameters import DELAY, FLAWS, RATE_LIMIT
-from .problem import QUIET, Disturbances, Fit
+from .problem import Disturbances, Fit
 
 #: a delay is believed if it is this many standard deviations from 0
 SURE_DELAY = 6.0
@@ -34,29 +34,29 @@ WORTH_A_LOOK = 3.0
 
 def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
                 notes: list[str]) -> tuple[list[Fit], bool]:
-    """Takes all forms down to COMPARED side by side. Those that are left, first the one that better predicts each log from all the
-    others, by the likelihood: one that is clearly worse than another that rests is given up. False: the logs do not tell, and the
-    form is the start's."""
-    left = list(fits)
+    """Takes all forms down to COMPARED side by side, or to where none can follow the logs. Those that are left, first the one that
+    better predicts each log from all the others, by the likelihood. One is given up that cannot follow the logs, or is clearly
+    worse, while another may. False: the logs do not tell, and the form is the start's."""
+    left, costs = list(fits), [np.inf]
     for sd in LEVELS[1:LEVELS.index(COMPARED) + 1]:
-        tried = [(*_lowered(fit, sd, check), fit) for fit in left]
-        rests, best, _ = min(tried, key=lambda one: one[1])
-        tried = [one for one in tried if not rests or one[1] < best + CLEAR_AT_FIRST or (one[0] and sd > FIRST_COMPARED)]
-        left = [fit for _, _, fit in sorted(tried, key=lambda one: one[1])]
-        for fit in left if sd == FIRST_COMPARED else ():
+        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, sd, check),)]
+        may = [fit for _, rests, fit in tried if fit.may_follow and rests]
+        best = min(cost for cost, _, _ in tried)
+        kept = [(cost, fit) for cost, rests, fit in tried if not may or fit in may or (
+            fit.may_follow or sd > FIRST_COMPARED and not rests) and cost < best + CLEAR_AT_FIRST]
+        costs, left = map(list, zip(*sorted(kept, key=lambda one: one[0])))
+        for fit in left if sd >= FIRST_COMPARED else ():
             fit.above = fit.copy()
-    costs = sorted(cost for _, cost, _ in tried)
+        if not any(fit.may_follow for fit in left):
+            break
     for fit, cost in zip(left, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
-    first, others, why = left[0], left[1:], 'it predicts left-out logs better'
-    if others and costs[-1] - costs[0] <= CLEAR_DIFFERENCE:
+    if len(left) > 1 and costs[-1] - costs[0] <= CLEAR_DIFFERENCE:
         return sorted(left, key=lambda fit: fit.problem.form.name != start_form), False
-    follow = [fit for fit in left if _follows(fit, check)] if others else []
-    if len(follow) == 1:
-        first, others, why = follow[0], [], 'it alone follows the logs to the steps of the counts'
     if len(fits) > 1:
-        notes.append(f'form: {first.problem.form.meaning}; {why}')
-    return [first, *others], True
+        why = 'it predicts left-out logs better' if len(left) > 1 else 'it alone may follow the logs to the steps of the counts'
+        notes.append(f'form: {left[0].problem.form.meaning}; {why}')
+    return left, True
 
 
 def _lowered(fit: Fit, sd: float, check: Callable[[], None]) -> tuple[bool, float]:
@@ -64,35 +64,29 @@ def _lowered(fit: Fit, sd: float, check: Callable[[], None]) -> tuple[bool, floa
     try:
         return descend(fit, [sd], check), left_out_cost(fit)
     except (ValueError, np.linalg.LinAlgError):
+        fit.least_rms = np.inf
         return False, np.inf
 
 
-def _follows(fit: Fit, check: Callable[[], None]) -> bool:
-    """Whether nothing but the steps of the counts is left between the logs and this form."""
-    try:
-        return finish_fit(fit.copy(), check, COMPARED).follows
-    except (ValueError, np.linalg.LinAlgError):
-        return False
-
-
-def with_steps(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
-    """The fit to duties as a board would have given them, which the logs hold as they were asked for. Believed only if nothing but
-    the counts' steps is left then: on a rig that the plant does not describe, any other duties may be likelier."""
+def with_steps(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Iterator[Fit]:
+    """The fit to duties as a board would have given them, which the logs hold as they were asked for, where that is likelier. To
+    be believed only if nothing but the counts' steps is left then: on a rig that the plant does not describe, any other duties
+    may be likelier."""
     duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
+    others = []
     for steps in PWM_STEPS[::-1]:
-        if np.abs(duties * steps - np.rint(duties * steps)).max() < 1e-5:
-            continue
-        # A half rounds up, as on the board, whatever the last digit of the log's.
-        logs = [dataclasses.replace(log, **{name: np.floor(getattr(log, name) * steps + 0.5 + 1e-6) / steps
-                                            for name in ('brake_pwm', 'motor_pwm')}) for log in fit.problem.logs]
-        other = fit.copy(problem=dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps), moved=None)
-        try:
-            if descend(other, [COMPARED], check) and (other := finish_fit(other, check, 3.2e-4)).follows:
-                say(f'duties of {steps} steps')
-                return other
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-    return fit
+        if np.abs(duties * steps - np.rint(duties * steps)).max() >= 1e-5:
+            # A half rounds up, as on the board, whatever the last digit of the log's.
+            logs = [dataclasses.replace(log, **{name: np.floor(getattr(log, name) * steps + 0.5 + 1e-6) / steps
+                                                for name in ('brake_pwm', 'motor_pwm')}) for log in fit.problem.logs]
+            others.append((dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps), fit.values))
+    if not others:
+        return
+    present, *costs = other_costs(fit, fit.disturbances, [True] * len(fit.pieces), [(fit.problem, fit.values), *others], check)
+    for cost, (problem, _) in sorted(zip(costs, others), key=lambda one: one[0]):
+        if cost < present - CLEAR_GAIN:
+            say(f'duties of {problem.pwm_steps} steps')
+            yield fit.copy(problem=problem, moved=None)
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
@@ -102,7 +96,7 @@ def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
                for log in logs)
 
 
-def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> Fit:
+def sought(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
     """The fit with a limit of the brake's rate if one explains the logs clearly better. Needs the linearisation of `step`."""
     problem = fit.problem
     if problem.with_rate_limit or RATE_LIMIT.key in problem.fixed or not any(log.brake_pwm.any() for log in problem.logs):
@@ -111,7 +105,8 @@ def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     affected = [bool(np.any(problem.logs[piece.log].brake_pwm[piece.rows] > 0)) for piece in fit.pieces]
 
     def costs_of(shares: Sequence[float]) -> list[float]:
-        return other_costs(fit, disturbances, affected, RATE_LIMIT.key, [share * fastest for share in shares], check)
+        values = [{**fit.values, RATE_LIMIT.key: share * fastest} for share in shares]
+        return other_costs(fit, fit.disturbances, affected, [(problem, one) for one in values], check)
 
     without, *first = costs_of((0.0, *FIRST_SHARES))
     if min(first) > without - WORTH_A_LOOK:
@@ -126,7 +121,7 @@ def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
 
 def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
     """As `sought`, with a few rounds around the limit."""
-    found = sought(fit, fit.disturbances, check)
+    found = sought(fit, check)
     if found is not fit:
         to_rest(found, found.disturbances, 3, check)
     return found
@@ -166,16 +161,11 @@ def without(fit: Fit) -> Fit:
     return fit.changed({RATE_LIMIT.key: 0.0}, with_rate_limit=False)
 
 
-def with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
-    """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
+def with_delay(fit: Fit) -> Fit:
+    """The fit with a delay of the inputs if the logs are sure of one."""
     late = fit.changed({DELAY: 0.0}, with_delay=True)
-    late.scale = linearise(late.problem, late.values, late.pieces, check)
-    N, n = keep_normals(late, run_filter(late, QUIET)[1])
+    late.scale = linearise(late.problem, late.values, late.pieces)
+    N, n = keep_normals(late, run_filter(late, fit.disturbances)[1])
     x = solved(late, N, n)[-1]
-    if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:
-        return fit
-    to_rest(late, QUIET, 8, check)
-    if not late.follows:
-        return fit
-    say(f'the inputs act {1e3 * late.values[DELAY]:.3g} ms late')
-    return late
+    sure = x >= SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) and 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S
+    return late if sure else fit

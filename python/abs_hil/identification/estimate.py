@@ -9,7 +9,9 @@ nothing but these steps is left, and intervals follow (intervals.py). If more is
 then flaws that the brake may have (structure.py), then a rig that wanders. Nothing is said of the rig by a fit that is not at
 rest (last step of at least one standard deviation) or leaves more than a count.
 """
+import contextlib
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -18,9 +20,9 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
-from .fit import COMPARED, LEVELS, RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
+from .fit import RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
-from .linear import run_filter, step, to_rest
+from .linear import run_filter, to_rest
 from .logs import Log, load_log, motion_of
 from .parameters import ALL_FORMS, FORMS, WHEELS, checked_keys
 from .problem import DISTURBANCES, QUIET, Fit, Problem, residuals
@@ -101,7 +103,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         return interrupted(fits[0], str(start), notes)
     of_logs = list(notes)
     found = assembled(finished, str(start), notes)
-    found.disagreement = disagreement(finished.fit)
+    found.disagreement = disagreement(finished.fit, finished.spread.scores)
     if why := finished.misfit or _doubt(found):
         causes = finished.causes
         off = (causes[0].cause.acts if causes else
@@ -127,21 +129,46 @@ def _doubt(found: Identified) -> str:
     return ''
 
 
-def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    """The fit without disturbances if it follows the logs: as it is, with duties as a board gives them, or with flaws. Else that
-    of a rig that wanders."""
-    say(f'{fit.problem.form.meaning}: fit')
-    above = fit.above or fit
-    nearest = quiet = _undisturbed(fit.copy(), check, say)
-    if quiet is None or (left := _left_by(quiet)):
-        say(f'{left if quiet else "no fit without disturbances"}: the rig wanders, or the model lacks something')
-        quiet = choices.with_steps(fit, check, say)
-        if quiet is fit or _left_by(quiet):
-            above, causes, cost = _explained_first(above, check, say)
-            quiet = _undisturbed(above.copy(), check, say) if above.problem.flaws != fit.problem.flaws else None
-            if quiet is None or _left_by(quiet):
-                nearest = quiet if quiet is not None and (nearest is None or quiet.rms_counts < nearest.rms_counts) else nearest
-                return _wandering(above, nearest or fit, causes, cost, say, check)
+def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+    """The first form that follows the logs without disturbances, else the first that needs nothing which the plant lacks, else the
+    one that is likelier with its surest cause: the disturbances of a wrong form may hide every cause."""
+    for fit in fits:
+        say(f'{fit.problem.form.meaning}: fit')
+        if (quiet := _quiet(fit, check, say)) is not None:
+            return _settled(quiet, seed, say, check)
+    done: list[Finished] = []
+    failed = ''
+    for fit in fits:
+        try:
+            done.append(_explained(fit, seed, say, check))
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failed = failed or f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
+            continue
+        if not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None):
+            return done[-1]
+    if not done:
+        raise ValueError(failed)
+    return min(done, key=lambda one: one.cost)
+
+
+def _quiet(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
+    """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
+    board gives them; with late inputs and a limit of the brake's rate where the logs show them."""
+    for tried in itertools.chain([fit], choices.with_steps(fit, check, say)):
+        try:
+            found = finish_fit(tried.copy(), check) if tried is not fit or fit.may_follow else fit
+            for remedy in (choices.with_delay, choices.sought):
+                if (more := remedy(found)) is not found and finish_fit(more, check).follows:
+                    found = more
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        if not (left := _left_by(found)):
+            return found
+        say(left)
+    return None
+
+
+def _settled(quiet: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
     quiet = choices.settle(choices.idle_flaws(quiet, check), QUIET, check)
     quiet, round_discs = intervals.settle_discs(quiet, QUIET, check)
     gaps = likely_u0(quiet, QUIET, check)
@@ -149,61 +176,53 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     return Finished(quiet, intervals.bootstrap(quiet, seed, check=check), gaps, None, round_discs)
 
 
-def _wandering(fit: Fit, nearest: Fit, first_causes: list[structure.Found], cost: float, say: Callable[[str], None],
-               check: Callable[[], None]) -> Finished:
-    """The fit of a rig that wanders. nearest: that without disturbances, whose residual shows where the model lacks something."""
-    try:
-        fit = disturbed_fit(fit, check, say)
-        limited = choices.started(fit, check)
-        fit = fit if limited is fit else disturbed_fit(limited, check, say)
-        while (found := structure.explained(fit, fit.disturbances, check, say))[0] is not fit:
-            fit = disturbed_fit(found[0], check, say)
-        causes = found[1]
-        if first_causes and any(one.cause is first_causes[0].cause for one in causes):
-            causes = first_causes  # surer
-        fit, round_discs = intervals.settle_discs(choices.settle(fit, fit.disturbances, check), fit.disturbances, check)
-        gaps = likely_u0(fit, fit.disturbances, check)
-    except (ValueError, np.linalg.LinAlgError) as error:
-        raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})') from None
-    left = ', '.join(f'{log}{f", phase {phase}," if phase else ""} {rms:.3g}' for rms, log, phase in residuals(nearest)[:3])
+def _explained(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+    """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
+    say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
+    before = fit.above or fit
+    fit, first_causes, cost = _explained_first(before, check, say)
+    if fit.problem.flaws != before.problem.flaws and (quiet := _quiet(fit, check, say)) is not None:
+        return _settled(quiet, seed, say, check)
+    fit = disturbed_fit(fit, check, say)
+    limited = choices.started(fit, check)
+    fit = fit if limited is fit else disturbed_fit(limited, check, say)
+    while (found := structure.explained(fit, fit.disturbances, check, say))[0] is not fit:
+        fit = disturbed_fit(found[0], check, say)
+    causes = found[1]
+    if first_causes and any(one.cause is first_causes[0].cause for one in causes):
+        causes = first_causes  # surer
+    fit, round_discs = intervals.settle_discs(choices.settle(fit, fit.disturbances, check), fit.disturbances, check)
+    gaps = likely_u0(fit, fit.disturbances, check)
     misfit = ''
     if not (fit.last_step < RESTS and fit.rms_counts <= LARGEST_RMS):
         misfit = (f'the fit did not get there (last step {fit.last_step:.3g} standard deviations, residual {fit.rms_counts:.3g} '
-                  f'counts RMS): nothing is said of the rig. Most is left in {left} counts RMS without disturbances')
+                  f'counts RMS): nothing is said of the rig. Most is left in {_most_left(fit)}')
         causes = []
     elif causes and structure.named(causes):
         misfit = structure.sentence(causes, fit)
     elif causes:
-        misfit = f'the model lacks something, most in {left} counts RMS; no single cause explains it'
+        misfit = f'the model lacks something, most in {_most_left(fit)}; no single cause explains it'
     say('intervals')
     spread = intervals.information(fit, 0.0 if misfit else structure.unsettled(fit, fit.disturbances))
     return Finished(fit, spread, gaps, fit.disturbances, round_discs, causes, misfit, cost)
 
 
+def _most_left(fit: Fit) -> str:
+    """Where the model lacks most: by what is left without disturbances."""
+    near = fit.copy()
+    with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+        to_rest(near, QUIET, 3)
+    left = ', '.join(f'{log}{f", phase {phase}," if phase else ""} {rms:.3g}' for rms, log, phase in residuals(near)[:3])
+    return f'{left} counts RMS without disturbances'
+
+
 def _left_by(quiet: Fit) -> str:
     """What says that more than the counts' steps disturbed the rig; empty if nothing does."""
     if not (quiet.follows and quiet.last_step < RESTS):
-        return f'residual {quiet.rms_counts:.4g} counts RMS, at most {quiet.bound_rms:.4f} by the steps of the counts'
+        return (f'residual at least {max(quiet.rms_counts, quiet.least_rms):.4g} counts RMS without disturbances, at most '
+                f'{quiet.bound_rms:.4f} by the steps of the counts')
     most = max(disagreement(quiet).values(), default=0.0)
     return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
-
-
-def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    """The first form that needs nothing which the plant lacks. Else the form that is likelier with its surest cause: the
-    disturbances of a wrong form may hide every cause."""
-    done: list[Finished] = []
-    failed = ''
-    for fit in fits:
-        try:
-            done.append(_finished(fit, seed, say, check))
-        except ValueError as error:
-            failed = failed or str(error)
-            continue
-        if not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None):
-            return done[-1]
-    if not done:
-        raise ValueError(failed)
-    return min(done, key=lambda one: one.cost)
 
 
 def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
@@ -220,22 +239,6 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
         flawed, left = structure.explained(choices.started(flawed, check), SMALL, check, say)
     cost = run_filter(flawed, SMALL)[0] - (left[0].sure**2 if left else 0.0)
     return (fit if flawed is near else flawed), left, cost
-
-
-def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
-    """The fit as if nothing disturbed the rig but the counts' steps; None if it ends nowhere."""
-    try:
-        fit = choices.with_delay(finish_fit(fit, check), check, say)
-        if fit.follows:
-            limited = choices.sought(fit, QUIET, check)
-        else:
-            near = fit.copy()
-            step(near, level(LEVELS[-1]), check)
-            limited = choices.started(near, check)
-            limited = fit if limited is near else limited
-        return fit if limited is fit else finish_fit(limited, check, COMPARED)
-    except (ValueError, np.linalg.LinAlgError):
-        return None
 
 
 def _refuse_odd(logs: Sequence[Log], plant: Mapping[str, float], counts_per_rev: int) -> None:

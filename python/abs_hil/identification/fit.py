@@ -33,22 +33,19 @@ COMPARED = 1e-3
 #: a fit rests at a level when a step goes less far than this, in standard deviations; it has so many steps for it
 RESTS = 1.0
 MOST_AT_A_LEVEL = 6
-#: one that does not rest and leaves more counts RMS than this goes no lower: it lacks something
-FOLLOWS_RMS = 0.33
+MOST_QUIET = 24
+#: of what a residual is above its bound: a step that takes less off is the last
+GAINLESS = 0.02
 #: an eccentricity below this sways no first value, rad
 SMALL_DISC_RAD = 3e-4
-#: a residual without disturbances that hardly falls from above this, in counts, will not fall to the counts' steps
-HOPELESS_RMS = 10.0
 #: of the likelihood, in one search for the disturbances
 MOST_EVALUATIONS = 20
 
 
-def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool], key: str, others: Sequence[float],
-                check: Callable[[], None]) -> list[float]:
-    """-2 log likelihood at other values of one parameter. It simulates the affected pieces anew and keeps the sensitivities,
-    so the other parameters may follow only as far as they are uncertain."""
-    problem = fit.problem
-    values = [{**fit.values, key: other} for other in others]
+def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
+                others: Sequence[tuple[Problem, Mapping[str, float]]], check: Callable[[], None]) -> list[float]:
+    """-2 log likelihood with other duties or values. It simulates the affected pieces anew and keeps the sensitivities, so the
+    other parameters may follow only as far as they are uncertain."""
     within = 5.0 * np.sqrt(np.diag(fit.covariance()))
     rest = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], disturbances)
     found, of_log = list(rest), {}
@@ -57,18 +54,18 @@ def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool], 
             continue
         check()
         if piece.log not in of_log:
-            of_log[piece.log] = [problem.simulated(piece.log, one) for one in values]
+            of_log[piece.log] = [problem.simulated(piece.log, values) for problem, values in others]
         (first, inputs), *more = of_log[piece.log]
-        other = _core.linearise(problem.base, first, [(one, 1.0, 'always', own) for one, own in more], inputs, piece.first,
+        other = _core.linearise(fit.problem.base, first, [(one, 1.0, 'always', own) for one, own in more], inputs, piece.first,
                                 piece.states)
         angles, ends = ([other[at]] + [other[at] + other[by][:, :, i] for i in range(len(more))]
                         for at, by in (('angles', 'by_parameter'), ('end', 'end_by_parameter')))
         moved = dataclasses.replace(piece, linear=dict(piece.linear))
-        measure(problem, fit.values, moved, angles, ends)
+        measure(fit.problem, fit.values, moved, angles, ends)
         found += filtered(fit, [moved], disturbances)
     N = np.asarray(sum(one[0] for one in found))
     costs = []
-    for i in range(len(values)):
+    for i in range(len(others)):
         at = [i if len(one[2]) > 1 else 0 for one in found]  # pieces that were not affected have one column
         n = np.asarray(sum(one[1][:, column] for one, column in zip(found, at)))
         x = solved(fit, N, n, -within, within)
@@ -106,7 +103,7 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     affected = [bool(np.any((duty >= edges[0]) & (duty <= edges[-1]))) for duty in acting]
     # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
     inside = [float(max(0.5 * (begin + end), end - 1e-3)) for begin, end in gaps]
-    costs = other_costs(fit, disturbances, affected, 'u0', inside, check)
+    costs = other_costs(fit, disturbances, affected, [(problem, {**fit.values, 'u0': u0}) for u0 in inside], check)
     tried = [(float(begin), float(end), cost) for (begin, end), cost in zip(gaps, costs)]
     fit.values['u0'] = inside[int(np.argmin(costs))]
     return tried
@@ -171,49 +168,48 @@ def level(sd: float) -> Disturbances:
     return Disturbances.of(sd, 0.3 * sd, 0.2 if sd > 0.03 else 0.5)
 
 
+def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float, check: Callable[[], None]) -> bool:
+    """Steps until one goes less far than `rests`, at most so many. False if none does, or if no further one will bring the fit
+    below the bound of its residual: where the gain of one falls below GAINLESS of what is missing."""
+    stuck, before = 0, np.inf
+    for number in range(most):
+        # What the logs hardly tell moves on without end: the longer it lasts, the larger a step may be the last.
+        if step(fit, disturbances, check) < min(max(rests, 0.05 * number), RESTS):
+            return True
+        stuck += fit.halvings >= MOST_HALVINGS
+        square = fit.least_rms**2
+        if stuck == 2 or before - square < GAINLESS * (square - fit.bound_rms**2):
+            break
+        before = square
+    return False
+
+
 def descend(fit: Fit, levels: Sequence[float], check: Callable[[], None] = lambda: None) -> bool:
-    """Lowers the disturbances level by level, and waits at each until the fit rests. False if it does not at the last one."""
+    """Lowers the disturbances level by level, and waits at each until the fit rests; goes no lower than where it shows that it
+    cannot follow the logs. False if it does not rest at the last one."""
     rests = False
     for sd in levels:
         present = level(sd)
         for number in range(3):
-            steps = stuck = 0
-            while not (rests := step(fit, present, check) < RESTS):
-                steps, stuck = steps + 1, stuck + (fit.halvings >= MOST_HALVINGS)
-                if steps == MOST_AT_A_LEVEL or stuck == 2:
-                    break
-            u0 = fit.values['u0']
+            rests, u0 = rest(fit, present, MOST_AT_A_LEVEL, RESTS, check), fit.values['u0']
             if number == 0 and sd > COMPARED:
                 search_u0(fit, present, 0.004, 9, check)
             search_u0(fit, present, 0.0, 6, check)
-            if not rests or fit.values['u0'] == u0:
+            if fit.values['u0'] == u0:
                 break
-        if not rests and fit.rms_counts > FOLLOWS_RMS:
+        if not fit.may_follow:
             break
     return rests
 
 
-def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, top: float = LEVELS[5]) -> Fit:
-    """From COMPARED down the levels, or from `top`, then without disturbances until nothing moves."""
+def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
+    """From the fit's level, or COMPARED, down the others; then without disturbances until nothing moves. It stays at the level
+    that shows that it cannot follow the logs."""
+    top = float(fit.disturbances.sd[0]) or COMPARED
     descend(fit, [sd for sd in LEVELS if sd <= top], check)
-    _undisturbed(fit, check)
+    if fit.may_follow:
+        rest(fit, QUIET, MOST_QUIET, CONVERGED, check)
     return fit
-
-
-def _undisturbed(fit: Fit, check: Callable[[], None]) -> None:
-    """Steps without disturbances until nothing moves, or until it shows that the logs are of a rig that wanders."""
-    before, stalls = np.inf, 0
-    for number in range(24):
-        moved = step(fit, QUIET, check)
-        # The residual settles last: past the peak the states need some rounds more than the parameters.
-        # What the logs hardly tell moves on without end: the longer it lasts, the larger a step may be the last.
-        if moved < min(max(CONVERGED, 0.05 * number), RESTS) or (
-                moved < RESTS and fit.rms_counts > 0.999 * before and not fit.follows):
-            break
-        stalls = stalls + 1 if fit.rms_counts > 0.99 * before > HOPELESS_RMS else 0
-        if stalls == 2:
-            break
-        before = fit.rms_counts
 
 
 def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Callable[[str], None] = lambda _: None) -> Fit:

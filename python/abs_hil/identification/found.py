@@ -270,19 +270,22 @@ def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
     return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
 
 
-def disagreement(fit: Fit) -> dict[str, float]:
+def disagreement(fit: Fit, scores: np.ndarray | None = None) -> dict[str, float]:
     """Of each log against all of them, by its name: the score of the log alone at the joint estimate, as chi-square over its
-    degrees of freedom. Empty for one log."""
+    degrees of freedom. Empty for one log. Its variances are the filter's, for errors that are independent; or those of `scores`
+    (intervals.bootstrap): where a wheel turns by nearly whole counts a row, errors follow each other."""
     out: dict[str, float] = {}
     logs = fit.problem.logs
     inverse = fit.covariance()
-    for log, Nl, nl in zip(logs, fit.normal, fit.right) if len(logs) > 1 else ():
+    for number, (log, Nl, nl) in enumerate(zip(logs, fit.normal, fit.right)) if len(logs) > 1 else ():
         told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
         d = 1 / np.sqrt(np.diag(Nl)[told])
         covariance = (Nl - Nl @ inverse @ Nl)[np.ix_(told, told)] * np.outer(d, d)
         values, vectors = np.linalg.eigh(covariance)
         kept = values > 1e-3  # what the log has in common with others; the rest is its own, and rounding
         if kept.any():
-            z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
-            out[log.name] = float(z @ z / kept.sum())
+            along, variance = vectors.T[kept] * d, values[kept]
+            if scores is not None:  # the mean of 1 / their variance's estimate is larger by draws / (draws - 2)
+                variance = np.sum((along @ scores[number][told])**2, axis=1) / (scores.shape[2] - 2)
+            out[log.name] = float(np.mean((along @ nl[told])**2 / variance))
     return out

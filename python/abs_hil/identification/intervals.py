@@ -26,9 +26,11 @@ CHANCE = 1e-6
 @dataclass
 class Spread:
     """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free. `of_logs`: the part
-    of it that the logs' own errors make, for combinations that hardly depend on the first values."""
+    of it that the logs' own errors make, for combinations that hardly depend on the first values; scores: of each log alone at
+    the joint estimate of each draw, (logs, n, draws)."""
     covariance: np.ndarray
     of_logs: np.ndarray
+    scores: np.ndarray | None = None
 
 
 def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None) -> Spread:
@@ -38,12 +40,13 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     random = np.random.default_rng(seed)
     phases = random.uniform(size=(len(problem.logs), 2, REPLICATES))
     late = np.array([[[problem.slots[wheel].error_counts if wheel in problem.slots else 0.0] for wheel in WHEELS]])
-    estimates = []
+    estimates, scores = [], []
     for begin in range(0, REPLICATES, _BATCH):
         check()
         chosen = phases[:, :, begin:begin + _BATCH]
         size = len(fit.scale)
-        N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
+        logs = len(problem.logs)
+        N, n = np.zeros((logs, size, size)), np.zeros((logs, size, chosen.shape[2]))
         for piece in fit.pieces:
             exact = piece.linear['read'] / per_count
             phase = chosen[piece.log][None]
@@ -56,13 +59,17 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros((*piece.states.shape, chosen.shape[2]))}
             changed.update(_core.condense(changed))
             found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]
-            N, n = N + found[0], n + found[1]
-        shift = solved(fit, N, np.zeros(size))  # what the prior alone does
-        estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
-    scatter = np.cov(np.transpose(estimates))
+            N[piece.log] += found[0]
+            n[piece.log] += found[1]
+        whole = N.sum(axis=0)
+        shift = solved(fit, whole, np.zeros(size))  # what the prior alone does
+        some = np.transpose([solved(fit, whole, right) - shift for right in n.sum(axis=0).T])
+        estimates.append(some)
+        scores.append(n - N @ some)
+    scatter = np.cov(np.concatenate(estimates, axis=1))
     # The first values' errors add to it: all of it where the logs tell nothing.
     known = fit.covariance()
-    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter)
+    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter, np.concatenate(scores, axis=2))
 
 
 def information(fit: Fit, more: np.ndarray | float = 0.0) -> Spread:

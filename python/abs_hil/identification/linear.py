@@ -18,7 +18,7 @@ import numpy as np
 from ..core import _core
 from .brake_flaws import act
 from .parameters import DEAD_TIME, DELAY, WHEELS, disc_of
-from .problem import Disturbances, Fit, Move, Piece, Problem
+from .problem import COUNT_VARIANCE, Disturbances, Fit, Move, Piece, Problem
 
 #: an iteration that moves less, in standard deviations, is the last
 CONVERGED = 0.1
@@ -207,6 +207,8 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
         high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
     x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
     fit.last_step = float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+    square, weights = (sum(float(np.ravel(one[i])[0]) for one in found) for i in (2, 4))
+    fit.least_rms = float(np.sqrt(COUNT_VARIANCE * max(square - 2.0 * n @ x + x @ N @ x, 0.0) / max(weights, 1e-9)))
     _move_states(fit, disturbances, x)
     shorter = max(fit.halvings - 1, 0)  # begin near the length that the last step had in the end
     x = x * 0.5**shorter

@@ -193,7 +193,8 @@ class Fit:
     """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
     of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated ones.
     last_step: how far it went, in standard deviations of the direction that the logs know best; halvings: of the one before it,
-    because it made things worse. above: a copy from larger disturbances, which a rig that wanders needs."""
+    because it made things worse; least_rms: see may_follow. above: a copy from larger disturbances, which a rig that wanders
+    needs."""
     problem: Problem
     values: dict[str, float]
     pieces: list[Piece]
@@ -206,6 +207,7 @@ class Fit:
     right: np.ndarray = field(default_factory=lambda: np.empty(0))
     cost: np.ndarray = field(default_factory=lambda: np.empty(0))
     rms_counts: float = np.nan
+    least_rms: float = np.inf
     moved: Move | None = None
     last_step: float = np.inf
     halvings: int = 0
@@ -242,7 +244,14 @@ class Fit:
     @property
     def follows(self) -> bool:
         """Whether nothing but the counts' steps is left between the logs and the plant."""
-        return self.rms_counts <= self.bound_rms
+        return not self.disturbances.sd.any() and self.rms_counts <= self.bound_rms
+
+    @property
+    def may_follow(self) -> bool:
+        """Whether it may follow the logs once nothing disturbs it. The filter's squared innovations are the least sum of squared
+        residuals and squared factors over their variances; so they only grow as the disturbances fall. `least_rms` is that sum
+        of the last step, as counts RMS: where it is above the bound, no smaller disturbance leads below."""
+        return self.least_rms <= self.bound_rms
 
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the scaled changes: the precision (n,), and its product with the way to the first values (n,)."""

@@ -214,35 +214,37 @@ def _foretold(wide: Fit, at: np.ndarray) -> bool:
     return logs > 1 and better and len(set(np.sign(score[shows]))) == 1
 
 
+def _reduced(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The normal equations of the columns `at` where those `beside` them follow: matrix and right side. The last one says how
+    these follow, (beside, 1 + at): their solution without any of `at`, less the columns times what `at` is."""
+    follow = inverse(N[np.ix_(beside, beside)]) @ np.column_stack([n[beside], N[np.ix_(beside, at)]])
+    left = np.column_stack([n[at], N[np.ix_(at, at)]]) - N[np.ix_(at, beside)] @ follow
+    return left[:, 1:], left[:, 0], follow
+
+
 def _gain(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> tuple[float, float]:
     """Of the columns `at`, alone but for what is `beside` them: the coefficient, or the largest of an angle's, and what they
     take off -2 log likelihood, less what nothing would take off with more columns than one."""
-    chosen = np.append(beside, at)
-    some = N[np.ix_(chosen, chosen)]
-    some[np.arange(len(beside), len(chosen)), np.arange(len(beside), len(chosen))] *= 1.0 + 1e-9  # two may be one
-    covariance = inverse(some)
-    x, own = (covariance @ n[chosen])[-at.size:], covariance[-at.size:, -at.size:]
-    size = x[0] if at.size == 1 else np.hypot(x[::2], x[1::2]).max()
-    return float(size), float(x @ np.linalg.solve(own, x)) - 2.0 * (at.size - 1)
+    left, right, _ = _reduced(N, n, beside, at)
+    x = np.linalg.solve(left + 1e-9 * np.diag(np.diag(N)[at]), right)  # two columns may be one
+    return float(x[0] if at.size == 1 else np.hypot(x[::2], x[1::2]).max()), float(x @ right) - 2.0 * (at.size - 1)
 
 
 def _together(N: np.ndarray, n: np.ndarray, beside: np.ndarray, at: np.ndarray) -> float:
     """What all columns `at` together take off -2 log likelihood, less what nothing would. Some may be sums of others."""
-    towards = inverse(N[np.ix_(beside, beside)]) @ np.column_stack([n[beside], N[np.ix_(beside, at)]])
+    left, right, _ = _reduced(N, n, beside, at)
     d = 1.0 / np.sqrt(np.diag(N)[at])
-    values, vectors = np.linalg.eigh((N[np.ix_(at, at)] - N[np.ix_(at, beside)] @ towards[:, 1:]) * np.outer(d, d))
-    along = vectors.T @ (d * (n[at] - N[np.ix_(at, beside)] @ towards[:, 0]))
+    values, vectors = np.linalg.eigh(left * np.outer(d, d))
     kept = values > 1e-7
-    return float(np.sum(along[kept]**2 / values[kept]) - kept.sum())
+    return float(np.sum((vectors.T @ (d * right))[kept]**2 / values[kept]) - kept.sum())
 
 
 def _moves(N: np.ndarray, n: np.ndarray, free: np.ndarray, at: np.ndarray) -> np.ndarray:
     """M, (parameters at `free`, 1 + columns at `at`): M M' is how far the solution for those parameters moves when these
     columns join it, squared, and what their errors add to its covariance."""
-    towards = inverse(N[np.ix_(free, free)]) @ np.column_stack([n[free], N[np.ix_(free, at)]])
-    covariance = inverse(N[np.ix_(at, at)] - N[np.ix_(at, free)] @ towards[:, 1:])
-    coefficients = covariance @ (n[at] - N[np.ix_(at, free)] @ towards[:, 0])
-    return np.asarray(towards[:, 1:] @ np.column_stack([coefficients, np.linalg.cholesky(covariance)]))
+    left, right, follow = _reduced(N, n, free, at)
+    covariance = inverse(left)
+    return np.asarray(follow[:, 1:] @ np.column_stack([covariance @ right, np.linalg.cholesky(covariance)]))
 
 
 def unsettled(fit: Fit, disturbances: Disturbances) -> np.ndarray:
