@@ -37,16 +37,16 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
     """Takes all forms down to COMPARED side by side, or to where none can follow the logs. Those that are left, first the one that
     better predicts each log from all the others, by the likelihood. One is given up that cannot follow the logs, or is clearly
     worse, while another may. False: the logs do not tell, and the form is the start's."""
-    left, costs = list(fits), [np.inf]
-    for sd in LEVELS[1:LEVELS.index(COMPARED) + 1]:
-        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, sd, check),)]
+    left, costs, levels = list(fits), [np.inf], LEVELS[1:LEVELS.index(COMPARED) + 1]
+    while levels:
+        now = levels if len(left) == 1 else levels[:1]
+        levels = levels[len(now):]
+        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, now, check),)]
         may = [fit for _, rests, fit in tried if fit.may_follow and rests]
         best = min(cost for cost, _, _ in tried)
         kept = [(cost, fit) for cost, rests, fit in tried if not may or fit in may or (
-            fit.may_follow or sd > FIRST_COMPARED and not rests) and cost < best + CLEAR_AT_FIRST]
+            fit.may_follow or now[-1] > FIRST_COMPARED and not rests) and cost < best + CLEAR_AT_FIRST]
         costs, left = map(list, zip(*sorted(kept, key=lambda one: one[0])))
-        for fit in left if sd >= FIRST_COMPARED else ():
-            fit.above = fit.copy()
         if not any(fit.may_follow for fit in left):
             break
     for fit, cost in zip(left, costs):
@@ -59,10 +59,10 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
     return left, True
 
 
-def _lowered(fit: Fit, sd: float, check: Callable[[], None]) -> tuple[bool, float]:
-    """Whether the form rests at this level, and its cost: infinite where it leads to a plant that cannot be."""
+def _lowered(fit: Fit, levels: Sequence[float], check: Callable[[], None]) -> tuple[bool, float]:
+    """Whether the form rests at the last of these levels, and its cost: infinite where it leads to a plant that cannot be."""
     try:
-        return descend(fit, [sd], check), left_out_cost(fit)
+        return descend(fit, levels, check), left_out_cost(fit)
     except (ValueError, np.linalg.LinAlgError):
         fit.least_rms = np.inf
         return False, np.inf

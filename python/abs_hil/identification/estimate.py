@@ -179,9 +179,9 @@ def _settled(quiet: Fit, seed: int, say: Callable[[str], None], check: Callable[
 def _explained(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
     """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
     say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
-    before = fit.above or fit
-    fit, first_causes, cost = _explained_first(before, check, say)
-    if fit.problem.flaws != before.problem.flaws and (quiet := _quiet(fit, check, say)) is not None:
+    flaws = fit.problem.flaws
+    fit, first_causes, cost = _explained_first(fit, check, say)
+    if fit.problem.flaws != flaws and (quiet := _quiet(fit, check, say)) is not None:
         return _settled(quiet, seed, say, check)
     fit = disturbed_fit(fit, check, say)
     limited = choices.started(fit, check)

@@ -186,19 +186,22 @@ def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float, check: C
 
 def descend(fit: Fit, levels: Sequence[float], check: Callable[[], None] = lambda: None) -> bool:
     """Lowers the disturbances level by level, and waits at each until the fit rests; goes no lower than where it shows that it
-    cannot follow the logs. False if it does not rest at the last one."""
-    rests = False
-    for sd in levels:
-        present = level(sd)
+    cannot follow the logs. False if it does not rest at the last one. Where a level's last step hardly moved, the steps converge
+    quadratically: then the next levels are left out, more each time."""
+    rests, at, stride = False, 0, 1
+    while at < len(levels):
+        present = level(levels[at])
         for number in range(3):
             rests, u0 = rest(fit, present, MOST_AT_A_LEVEL, RESTS, check), fit.values['u0']
-            if number == 0 and sd > COMPARED:
+            if number == 0 and levels[at] > COMPARED:
                 search_u0(fit, present, 0.004, 9, check)
             search_u0(fit, present, 0.0, 6, check)
             if fit.values['u0'] == u0:
                 break
         if not fit.may_follow:
             break
+        stride = 2 * stride if rests and fit.last_step < CONVERGED else 1
+        at += stride
     return rests
 
 

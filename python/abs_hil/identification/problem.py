@@ -193,8 +193,7 @@ class Fit:
     """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
     of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated ones.
     last_step: how far it went, in standard deviations of the direction that the logs know best; halvings: of the one before it,
-    because it made things worse; least_rms: see may_follow. above: a copy from larger disturbances, which a rig that wanders
-    needs."""
+    because it made things worse; least_rms: see may_follow."""
     problem: Problem
     values: dict[str, float]
     pieces: list[Piece]
@@ -211,7 +210,6 @@ class Fit:
     moved: Move | None = None
     last_step: float = np.inf
     halvings: int = 0
-    above: 'Fit | None' = None
 
     def copy(self, **changes: Any) -> Self:
         """A fit that can go on without this one."""
