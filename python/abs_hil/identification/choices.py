@@ -1,7 +1,7 @@
 """What of the model the logs ask for: the form of tyre and load, a limit of the brake's rate, a delay of the board's inputs, the
 steps of its duties."""
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,11 +9,12 @@ from .brake_flaws import brake_torques, static_torques
 from .fit import COMPARED, LEVELS, descend, other_costs
 from .linear import keep_normals, left_out_cost, linearise, run_filter, solved, to_rest
 from .logs import Log
-from .parameters import DELAY, FLAWS, RATE_LIMIT
-from .problem import Disturbances, Fit
+from .parameters import DELAY, JOINING, RATE_LIMIT
+from .problem import Fit
 
-#: a delay is believed if it is this many standard deviations from 0
+#: a delay is believed if it is this many standard deviations from 0, and a flaw kept
 SURE_DELAY = 6.0
+SURE = 4.0
 LARGEST_DELAY_S = 0.02
 #: a difference of -2 log likelihood that decides between the forms, and one that does so above the level that compares them
 CLEAR_DIFFERENCE = 500.0
@@ -32,8 +33,7 @@ SHARES = (*np.geomspace(0.06, 0.9, 15), 0.95, 0.98)
 WORTH_A_LOOK = 3.0
 
 
-def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
-                notes: list[str]) -> tuple[list[Fit], bool]:
+def better_form(fits: Sequence[Fit], start_form: str, notes: list[str]) -> tuple[list[Fit], bool]:
     """Takes all forms down to COMPARED side by side, or to where none can follow the logs. Those that are left, first the one that
     better predicts each log from all the others, by the likelihood. One is given up that cannot follow the logs, or is clearly
     worse, while another may. False: the logs do not tell, and the form is the start's."""
@@ -41,7 +41,7 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
     while levels:
         now = levels if len(left) == 1 else levels[:1]
         levels = levels[len(now):]
-        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, now, check),)]
+        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, now),)]
         may = [fit for _, rests, fit in tried if fit.may_follow and rests]
         best = min(cost for cost, _, _ in tried)
         kept = [(cost, fit) for cost, rests, fit in tried if not may or fit in may or (
@@ -50,7 +50,7 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
         if not any(fit.may_follow for fit in left):
             break
     for fit, cost in zip(left, costs):
-        say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
+        fit.problem.say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
     if len(left) > 1 and costs[-1] - costs[0] <= CLEAR_DIFFERENCE:
         return sorted(left, key=lambda fit: fit.problem.form.name != start_form), False
     if len(fits) > 1:
@@ -59,16 +59,16 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
     return left, True
 
 
-def _lowered(fit: Fit, levels: Sequence[float], check: Callable[[], None]) -> tuple[bool, float]:
+def _lowered(fit: Fit, levels: Sequence[float]) -> tuple[bool, float]:
     """Whether the form rests at the last of these levels, and its cost: infinite where it leads to a plant that cannot be."""
     try:
-        return descend(fit, levels, check), left_out_cost(fit)
+        return descend(fit, levels), left_out_cost(fit)
     except (ValueError, np.linalg.LinAlgError):
         fit.least_rms = np.inf
         return False, np.inf
 
 
-def with_steps(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Iterator[Fit]:
+def with_steps(fit: Fit) -> Iterator[Fit]:
     """The fit to duties as a board would have given them, which the logs hold as they were asked for, where that is likelier. To
     be believed only if nothing but the counts' steps is left then: on a rig that the plant does not describe, any other duties
     may be likelier."""
@@ -82,10 +82,10 @@ def with_steps(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) 
             others.append((dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps), fit.values))
     if not others:
         return
-    present, *costs = other_costs(fit, fit.disturbances, [True] * len(fit.pieces), [(fit.problem, fit.values), *others], check)
+    present, *costs = other_costs(fit, [True] * len(fit.pieces), [(fit.problem, fit.values), *others])
     for cost, (problem, _) in sorted(zip(costs, others), key=lambda one: one[0]):
         if cost < present - CLEAR_GAIN:
-            say(f'duties of {problem.pwm_steps} steps')
+            problem.say(f'duties of {problem.pwm_steps} steps')
             yield fit.copy(problem=problem, moved=None)
 
 
@@ -96,17 +96,16 @@ def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
                for log in logs)
 
 
-def sought(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
+def sought(fit: Fit) -> Fit:
     """The fit with a limit of the brake's rate if one explains the logs clearly better. Needs the linearisation of `step`."""
     problem = fit.problem
-    if problem.with_rate_limit or RATE_LIMIT.key in problem.fixed or not any(log.brake_pwm.any() for log in problem.logs):
+    if RATE_LIMIT.key in {*problem.flaws, *problem.fixed} or not any(log.brake_pwm.any() for log in problem.logs):
         return fit
     fastest = fastest_Nm_s(fit, problem.logs)
     affected = [bool(np.any(problem.logs[piece.log].brake_pwm[piece.rows] > 0)) for piece in fit.pieces]
 
     def costs_of(shares: Sequence[float]) -> list[float]:
-        values = [{**fit.values, RATE_LIMIT.key: share * fastest} for share in shares]
-        return other_costs(fit, fit.disturbances, affected, [(problem, one) for one in values], check)
+        return other_costs(fit, affected, [(problem, {**fit.values, RATE_LIMIT.key: share * fastest}) for share in shares])
 
     without, *first = costs_of((0.0, *FIRST_SHARES))
     if min(first) > without - WORTH_A_LOOK:
@@ -116,56 +115,33 @@ def sought(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
     if not costs[best] < without - CLEAR_GAIN:
         return fit
     limit = {RATE_LIMIT.key: SHARES[best] * fastest}
-    return dataclasses.replace(fit.changed(limit, with_rate_limit=True), first={**fit.first, **limit})
-
-
-def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
-    """As `sought`, with a few rounds around the limit."""
-    found = sought(fit, check)
-    if found is not fit:
-        to_rest(found, found.disturbances, 3, check)
-    return found
-
-
-def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> Fit:
-    """The fit without a limit that its logs do not tell after all."""
-    if not fit.problem.with_rate_limit:
-        return fit
-    at = fit.keys.index(RATE_LIMIT.key)
-    value = fit.values[RATE_LIMIT.key]
-    sd = float(np.sqrt(fit.covariance()[at, at]) * fit.scale[at])
-    if sd < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs):
-        return fit
-    fit = without(fit)
-    to_rest(fit, disturbances, 4, check)
-    return fit
-
-
-def idle_flaws(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
-    """The fit without flaws that its logs show no longer, as a dead time of the first values that went to 0."""
-    sd = np.sqrt(np.diag(fit.covariance())) * fit.scale
-    idle = [flaw.key for flaw in FLAWS if flaw.key in fit.problem.flaws
-            and abs(fit.values[flaw.key] - flaw.none) <= SURE_DELAY * sd[fit.keys.index(flaw.key)]]
-    if not idle:
-        return fit
-    fit = fit.changed({}, flaws=tuple(key for key in fit.problem.flaws if key not in idle))
-    fit.values = {key: value for key, value in fit.values.items() if key not in idle}
-    to_rest(fit, fit.disturbances, 4, check)
-    return fit
-
-
-def without(fit: Fit) -> Fit:
-    """A copy of the fit in which the lag alone holds the brake's torque back."""
-    if not fit.problem.with_rate_limit:
-        return fit.copy()
-    return fit.changed({RATE_LIMIT.key: 0.0}, with_rate_limit=False)
+    limited = dataclasses.replace(fit.changed(limit, flaws=(*problem.flaws, RATE_LIMIT.key)), first={**fit.first, **limit})
+    to_rest(limited, fit.disturbances, 3)
+    return limited
 
 
 def with_delay(fit: Fit) -> Fit:
     """The fit with a delay of the inputs if the logs are sure of one."""
-    late = fit.changed({DELAY: 0.0}, with_delay=True)
+    late = fit.changed({DELAY: 0.0}, flaws=(*fit.problem.flaws, DELAY))
     late.scale = linearise(late.problem, late.values, late.pieces)
     N, n = keep_normals(late, run_filter(late, fit.disturbances)[1])
     x = solved(late, N, n)[-1]
     sure = x >= SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) and 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S
     return late if sure else fit
+
+
+def settle(fit: Fit) -> Fit:
+    """The fit without what its logs do not tell after all: an unsure limit, a dead time of the first values that went to 0."""
+    sd = dict(zip(fit.keys, np.sqrt(np.diag(fit.covariance())) * fit.scale))
+    idle = []
+    for key in fit.problem.flaws:
+        value, none = fit.values[key], JOINING[key].none
+        if key == RATE_LIMIT.key:
+            told = sd[key] < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs)
+        else:
+            told = abs(value - none) > SURE * sd[key]
+        idle += [] if told else [key]
+    if idle:
+        fit = fit.without(idle)
+        to_rest(fit, fit.disturbances, 4)
+    return fit

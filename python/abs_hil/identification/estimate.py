@@ -22,9 +22,9 @@ from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
 from .fit import RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
-from .linear import run_filter, to_rest
+from .linear import keep_normals, run_filter, to_rest
 from .logs import Log, load_log, motion_of
-from .parameters import ALL_FORMS, FORMS, WHEELS, checked_keys
+from .parameters import ALL_FORMS, FORMS, RATE_LIMIT, WHEELS, checked_keys
 from .problem import DISTURBANCES, QUIET, Fit, Problem, residuals
 
 #: the wheels' radii differ by less than this factor: further from 1, the wheels did not roll on each other
@@ -37,6 +37,8 @@ FASTEST_RAD_S = 2000.0
 SMALL = level(0.01)
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
 LARGEST_WANDER = 0.1
+#: the logs' mean disagreement by chance, at most
+CHANCE = 2.0
 #: what acts there and does not fit leaves the form of the tyre open
 AT_THE_CONTACT = ('road', 'r1_m')
 
@@ -83,27 +85,30 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         one.name: one for one in ALL_FORMS if one.settings['plant.load'] == given['load']}
     for tried in forms.values() if form == 'auto' else (forms[form],):
         say(f'{tried.meaning}: first values')
-        problem = Problem.of(tried, start, loaded, fix, drift, WHEELS)
+        problem = dataclasses.replace(Problem.of(tried, start, loaded, fix, drift, WHEELS), say=say, check=check)
         if not any(problem.segments):
             upper, lower = np.max([motion.speed_rad_s.max(axis=0) for motion in problem.motions], axis=0)
             raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s): with '
                              f'{counts_per_rev} counts per revolution the upper wheel reaches {upper:.3g} rad/s, the lower one '
                              f'{lower:.3g}; are the counts of another unit?')
         try:
-            begun.append(start_fit(problem, values, check, begun[0] if begun else None))
+            begun.append(start_fit(problem, values, begun[0] if begun else None))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{tried.meaning}: cannot be fitted ({error})')
     if not begun:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
     # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
-    fits, decided = choices.better_form([choices.started(one, check) for one in begun], start_form, check, say, notes)
+    fits, decided = choices.better_form([choices.sought(one) for one in begun], start_form, notes)
     try:
-        finished = _likelier(fits, seed, say, check)
+        finished = _likelier(fits, seed)
     except KeyboardInterrupt:
         return interrupted(fits[0], str(start), notes)
     of_logs = list(notes)
     found = assembled(finished, str(start), notes)
-    found.disagreement = disagreement(finished.fit, finished.spread.scores)
+    of_all = finished.fit.copy()
+    if finished.disturbances is not None:  # to disagree by less is no reason to refuse a rig
+        keep_normals(of_all, run_filter(of_all, finished.disturbances.at_least())[1])
+    found.disagreement = disagreement(of_all, finished.spread.scores)
     if why := finished.misfit or _doubt(found):
         causes = finished.causes
         off = (causes[0].cause.acts if causes else
@@ -129,70 +134,64 @@ def _doubt(found: Identified) -> str:
     return ''
 
 
-def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+def _likelier(fits: Sequence[Fit], seed: int) -> Finished:
     """The first form that follows the logs without disturbances, else the first that needs nothing which the plant lacks, else the
-    one that is likelier with its surest cause: the disturbances of a wrong form may hide every cause."""
+    first."""
     for fit in fits:
-        say(f'{fit.problem.form.meaning}: fit')
-        if (quiet := _quiet(fit, check, say)) is not None:
-            return _settled(quiet, seed, say, check)
+        fit.problem.say(f'{fit.problem.form.meaning}: fit')
+        if (quiet := _quiet(fit)) is not None:
+            return _settled(quiet, seed)
     done: list[Finished] = []
     failed = ''
     for fit in fits:
         try:
-            done.append(_explained(fit, seed, say, check))
+            done.append(_explained(fit, seed))
         except (ValueError, np.linalg.LinAlgError) as error:
             failed = failed or f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
-            continue
-        if not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None):
+        if done and (not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None)):
             return done[-1]
     if not done:
         raise ValueError(failed)
-    return min(done, key=lambda one: one.cost)
+    return done[0]
 
 
-def _quiet(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
+def _quiet(fit: Fit) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
     board gives them; with late inputs and a limit of the brake's rate where the logs show them."""
-    for tried in itertools.chain([fit], choices.with_steps(fit, check, say)):
+    for tried in itertools.chain([fit], choices.with_steps(fit)):
         try:
-            found = finish_fit(tried.copy(), check) if tried is not fit or fit.may_follow else fit
+            found = finish_fit(tried.copy()) if tried is not fit or fit.may_follow else fit
             for remedy in (choices.with_delay, choices.sought):
-                if (more := remedy(found)) is not found and finish_fit(more, check).follows:
+                if (more := remedy(found)) is not found and finish_fit(more).follows:
                     found = more
         except (ValueError, np.linalg.LinAlgError):
             continue
         if not (left := _left_by(found)):
             return found
-        say(left)
+        fit.problem.say(left)
     return None
 
 
-def _settled(quiet: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    quiet = choices.settle(choices.idle_flaws(quiet, check), QUIET, check)
-    quiet, round_discs = intervals.settle_discs(quiet, QUIET, check)
-    gaps = likely_u0(quiet, QUIET, check)
-    say('intervals')
-    return Finished(quiet, intervals.bootstrap(quiet, seed, check=check), gaps, None, round_discs)
+def _settled(quiet: Fit, seed: int) -> Finished:
+    quiet, round_discs = intervals.settle_discs(choices.settle(quiet))
+    gaps = likely_u0(quiet)
+    quiet.problem.say('intervals')
+    return Finished(quiet, intervals.bootstrap(quiet, seed), gaps, None, round_discs)
 
 
-def _explained(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+def _explained(fit: Fit, seed: int) -> Finished:
     """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
-    say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
-    flaws = fit.problem.flaws
-    fit, first_causes, cost = _explained_first(fit, check, say)
-    if fit.problem.flaws != flaws and (quiet := _quiet(fit, check, say)) is not None:
-        return _settled(quiet, seed, say, check)
-    fit = disturbed_fit(fit, check, say)
-    limited = choices.started(fit, check)
-    fit = fit if limited is fit else disturbed_fit(limited, check, say)
-    while (found := structure.explained(fit, fit.disturbances, check, say))[0] is not fit:
-        fit = disturbed_fit(found[0], check, say)
+    fit.problem.say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
+    if (flawed := _flawed(fit)) is not fit and (quiet := _quiet(flawed)) is not None:
+        return _settled(quiet, seed)
+    fit = disturbed_fit(flawed)
+    limited = choices.sought(fit)
+    fit = fit if limited is fit else disturbed_fit(limited)
+    while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
+        fit = disturbed_fit(found[0])
     causes = found[1]
-    if first_causes and any(one.cause is first_causes[0].cause for one in causes):
-        causes = first_causes  # surer
-    fit, round_discs = intervals.settle_discs(choices.settle(fit, fit.disturbances, check), fit.disturbances, check)
-    gaps = likely_u0(fit, fit.disturbances, check)
+    fit, round_discs = intervals.settle_discs(choices.settle(fit))
+    gaps = likely_u0(fit)
     misfit = ''
     if not (fit.last_step < RESTS and fit.rms_counts <= LARGEST_RMS):
         misfit = (f'the fit did not get there (last step {fit.last_step:.3g} standard deviations, residual {fit.rms_counts:.3g} '
@@ -202,9 +201,12 @@ def _explained(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[
         misfit = structure.sentence(causes, fit)
     elif causes:
         misfit = f'the model lacks something, most in {_most_left(fit)}; no single cause explains it'
-    say('intervals')
-    spread = intervals.information(fit, 0.0 if misfit else structure.unsettled(fit, fit.disturbances))
-    return Finished(fit, spread, gaps, fit.disturbances, round_discs, causes, misfit, cost)
+    fit.problem.say('intervals')
+    # What changed between the logs by more than chance makes all of them less certain (Birge 1932).
+    birge = float(np.mean([*disagreement(fit).values()] or [1.0]))
+    unsure = 0.0 if misfit else structure.unsettled(fit, fit.disturbances)
+    spread = intervals.information(fit, unsure, birge if birge > CHANCE else 1.0)
+    return Finished(fit, spread, gaps, fit.disturbances, round_discs, causes, misfit)
 
 
 def _most_left(fit: Fit) -> str:
@@ -225,20 +227,16 @@ def _left_by(quiet: Fit) -> str:
     return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
 
 
-def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
-    """The fit with the flaws that it shows while small disturbances are allowed, if it rests there. With the causes that are left,
-    and -2 log likelihood with the surest of them."""
-    near = choices.without(fit)  # a limit that was found may stand for a flaw
-    to_rest(near, SMALL, 10, check, RESTS)
-    if search_u0(near, SMALL, 0.01, 9, check):
-        to_rest(near, SMALL, 3, check, RESTS)
+def _flawed(fit: Fit) -> Fit:
+    """The fit with the flaws that it shows while small disturbances are allowed, if it rests there."""
+    near = fit.without([RATE_LIMIT.key])  # it may stand for a flaw
+    to_rest(near, SMALL, 10, RESTS)
+    if search_u0(near, 0.01, 9):
+        to_rest(near, SMALL, 3, RESTS)
     if not (near.rms_counts <= LARGEST_RMS and near.last_step < RESTS):
-        return fit, [], np.inf  # too far off to tell anything
-    flawed, left = structure.explained(near, SMALL, check, say)
-    if flawed is not near:
-        flawed, left = structure.explained(choices.started(flawed, check), SMALL, check, say)
-    cost = run_filter(flawed, SMALL)[0] - (left[0].sure**2 if left else 0.0)
-    return (fit if flawed is near else flawed), left, cost
+        return fit  # too far off to tell anything
+    flawed, _ = structure.explained(near, SMALL)
+    return fit if flawed is near else structure.explained(choices.sought(flawed), SMALL)[0]
 
 
 def _refuse_odd(logs: Sequence[Log], plant: Mapping[str, float], counts_per_rev: int) -> None:

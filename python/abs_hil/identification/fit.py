@@ -14,7 +14,7 @@ these steps: the likelihood is flat between two duties of the logs, so the gaps 
 constant are those of maximum likelihood, by its slopes (filter) and L-BFGS-B.
 """
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.optimize
@@ -42,17 +42,15 @@ SMALL_DISC_RAD = 3e-4
 MOST_EVALUATIONS = 20
 
 
-def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
-                others: Sequence[tuple[Problem, Mapping[str, float]]], check: Callable[[], None]) -> list[float]:
+def other_costs(fit: Fit, affected: Sequence[bool], others: Sequence[tuple[Problem, Mapping[str, float]]]) -> list[float]:
     """-2 log likelihood with other duties or values. It simulates the affected pieces anew and keeps the sensitivities, so the
     other parameters may follow only as far as they are uncertain."""
     within = 5.0 * np.sqrt(np.diag(fit.covariance()))
-    rest = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], disturbances)
-    found, of_log = list(rest), {}
+    found, of_log = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], fit.disturbances), {}
     for piece, hit in zip(fit.pieces, affected):
         if not hit:
             continue
-        check()
+        fit.problem.check()
         if piece.log not in of_log:
             of_log[piece.log] = [problem.simulated(piece.log, values) for problem, values in others]
         (first, inputs), *more = of_log[piece.log]
@@ -62,7 +60,7 @@ def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
                         for at, by in (('angles', 'by_parameter'), ('end', 'end_by_parameter')))
         moved = dataclasses.replace(piece, linear=dict(piece.linear))
         measure(fit.problem, fit.values, moved, angles, ends)
-        found += filtered(fit, [moved], disturbances)
+        found += filtered(fit, [moved], fit.disturbances)
     N = np.asarray(sum(one[0] for one in found))
     costs = []
     for i in range(len(others)):
@@ -73,19 +71,17 @@ def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
     return costs
 
 
-def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
-              check: Callable[[], None] = lambda: None) -> list[tuple[float, float, float]]:
+def search_u0(fit: Fit, width: float, most: int) -> list[tuple[float, float, float]]:
     """Moves u0 to the most likely gap between the duties of the logs, of at most so many, within `width` of its value, or beside
     it for a width of 0. A log tells of u0 only in which of these gaps it lies: the cost is flat within one. Needs the
     linearisation of `step`; that stays valid.
 
     Returns (begin of the gap, end of the gap, cost) of those tried, in order.
     """
-    problem = fit.problem
+    problem, present = fit.problem, fit.values['u0']
     if 'u0' in problem.fixed:
         return []
-    present = fit.values['u0']
-    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
+    duties = problem.duties
     # Below the duty at which its line crosses zero the brake gives nothing, wherever u0 lies: a search there sees no slope.
     if present < (crossing := -fit.values['b2_Nm'] / fit.values['b1_Nm']) < duties[-1]:
         present = crossing
@@ -103,41 +99,39 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     affected = [bool(np.any((duty >= edges[0]) & (duty <= edges[-1]))) for duty in acting]
     # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
     inside = [float(max(0.5 * (begin + end), end - 1e-3)) for begin, end in gaps]
-    costs = other_costs(fit, disturbances, affected, [(problem, {**fit.values, 'u0': u0}) for u0 in inside], check)
+    costs = other_costs(fit, affected, [(problem, {**fit.values, 'u0': u0}) for u0 in inside])
     tried = [(float(begin), float(end), cost) for (begin, end), cost in zip(gaps, costs)]
     fit.values['u0'] = inside[int(np.argmin(costs))]
     return tried
 
 
-def likely_u0(fit: Fit, disturbances: Disturbances,
-              check: Callable[[], None] = lambda: None) -> list[tuple[float, float, float]]:
+def likely_u0(fit: Fit) -> list[tuple[float, float, float]]:
     """The gaps around u0 with their costs, over a range so wide that both its ends are unlikely, if there is one. Where another
     gap than u0's is the likeliest, the fit rests there first."""
     gaps: list[tuple[float, float, float]] = []
-    duties = np.unique(np.concatenate([log.brake_pwm for log in fit.problem.logs]))
+    duties = fit.problem.duties
     for _ in range(3):
         before = np.searchsorted(duties, fit.values['u0'])
         for width in (8e-4, 3e-3, 1.2e-2, 4e-2):
-            gaps = search_u0(fit, disturbances, width, 12, check)
+            gaps = search_u0(fit, width, 12)
             least = min((gap[2] for gap in gaps), default=0.0) + 10.0
             if not gaps or ((gaps[0][2] > least or gaps[0][0] <= duties[0])
                             and (gaps[-1][2] > least or gaps[-1][1] >= duties[-1])):
                 break
         if np.searchsorted(duties, fit.values['u0']) == before:
             break
-        to_rest(fit, disturbances, 6, check)
+        to_rest(fit, fit.disturbances, 6)
     return gaps
 
 
-def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None,
-              other_form: Fit | None = None) -> Fit:
+def start_fit(problem: Problem, start: Mapping[str, float], other_form: Fit | None = None) -> Fit:
     """First values and a few rounds with large disturbances: near the truth, whatever the start. What `other_form` found of
     the same logs is not sought again."""
     if other_form is not None:
         problem = dataclasses.replace(problem, motions=other_form.problem.motions)
         discs = {p.key: other_form.first[p.key] for p in problem.parameters if p.acts == 'reading'}
-        return _started(problem, start, check, discs, other_form.first)
-    fit = _started(problem, start, check)
+        return _started(problem, start, discs, other_form.first)
+    fit = _started(problem, start)
     discs = {p.key: fit.values[p.key] for p in problem.parameters if p.acts == 'reading'}
     if all(abs(value) < SMALL_DISC_RAD for value in discs.values()):
         return fit
@@ -148,10 +142,10 @@ def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], 
         turned = motion_of(dataclasses.replace(log, counts=log.counts - disc_waves_rad(problem, discs, number, read)
                                                / problem.radians_per_count), problem.counts_per_rev)
         motions.append(dataclasses.replace(motion, smooth_rad=turned.smooth_rad, speed_rad_s=turned.speed_rad_s))
-    return _started(dataclasses.replace(problem, motions=motions), start, check, discs)
+    return _started(dataclasses.replace(problem, motions=motions), start, discs)
 
 
-def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], None],
+def _started(problem: Problem, start: Mapping[str, float],
              discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
     first = first_values(problem, start, other_form)
     problem = dataclasses.replace(problem, flaws=tuple(flaw.key for flaw in FLAWS if flaw.key in first))
@@ -160,7 +154,7 @@ def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], N
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
     fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), level(LEVELS[0]), WINDOW_S, free, dict(values))
     for _ in range(2):
-        step(fit, level(LEVELS[0]), check)
+        step(fit, level(LEVELS[0]))
     return fit
 
 
@@ -168,13 +162,13 @@ def level(sd: float) -> Disturbances:
     return Disturbances.of(sd, 0.3 * sd, 0.2 if sd > 0.03 else 0.5)
 
 
-def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float, check: Callable[[], None]) -> bool:
+def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float) -> bool:
     """Steps until one goes less far than `rests`, at most so many. False if none does, or if no further one will bring the fit
     below the bound of its residual: where the gain of one falls below GAINLESS of what is missing."""
     stuck, before = 0, np.inf
     for number in range(most):
         # What the logs hardly tell moves on without end: the longer it lasts, the larger a step may be the last.
-        if step(fit, disturbances, check) < min(max(rests, 0.05 * number), RESTS):
+        if step(fit, disturbances) < min(max(rests, 0.05 * number), RESTS):
             return True
         stuck += fit.halvings >= MOST_HALVINGS
         square = fit.least_rms**2
@@ -184,7 +178,7 @@ def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float, check: C
     return False
 
 
-def descend(fit: Fit, levels: Sequence[float], check: Callable[[], None] = lambda: None) -> bool:
+def descend(fit: Fit, levels: Sequence[float]) -> bool:
     """Lowers the disturbances level by level, and waits at each until the fit rests; goes no lower than where it shows that it
     cannot follow the logs. False if it does not rest at the last one. Where a level's last step hardly moved, the steps converge
     quadratically: then the next levels are left out, more each time."""
@@ -192,10 +186,10 @@ def descend(fit: Fit, levels: Sequence[float], check: Callable[[], None] = lambd
     while at < len(levels):
         present = level(levels[at])
         for number in range(3):
-            rests, u0 = rest(fit, present, MOST_AT_A_LEVEL, RESTS, check), fit.values['u0']
+            rests, u0 = rest(fit, present, MOST_AT_A_LEVEL, RESTS), fit.values['u0']
             if number == 0 and levels[at] > COMPARED:
-                search_u0(fit, present, 0.004, 9, check)
-            search_u0(fit, present, 0.0, 6, check)
+                search_u0(fit, 0.004, 9)
+            search_u0(fit, 0.0, 6)
             if fit.values['u0'] == u0:
                 break
         if not fit.may_follow:
@@ -205,32 +199,32 @@ def descend(fit: Fit, levels: Sequence[float], check: Callable[[], None] = lambd
     return rests
 
 
-def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
+def finish_fit(fit: Fit) -> Fit:
     """From the fit's level, or COMPARED, down the others; then without disturbances until nothing moves. It stays at the level
     that shows that it cannot follow the logs."""
     top = float(fit.disturbances.sd[0]) or COMPARED
-    descend(fit, [sd for sd in LEVELS if sd <= top], check)
+    descend(fit, [sd for sd in LEVELS if sd <= top])
     if fit.may_follow:
-        rest(fit, QUIET, MOST_QUIET, CONVERGED, check)
+        rest(fit, QUIET, MOST_QUIET, CONVERGED)
     return fit
 
 
-def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Callable[[str], None] = lambda _: None) -> Fit:
+def disturbed_fit(fit: Fit) -> Fit:
     """A fit for a rig whose factors wander: estimates how much, by maximum likelihood, along with the parameters."""
     problem = fit.problem
     fit = dataclasses.replace(fit, pieces=pieces_of(problem, fit.values, WINDOW_DISTURBED_S), window_s=WINDOW_DISTURBED_S)
     present = Disturbances.of(0.02, 0.01, 0.2)
     for round_number in range(4):
         for _ in range(2 if round_number == 0 else 1):
-            moved = step(fit, present, check)
-        if round_number == 0 and search_u0(fit, present, 0.03, 13, check):
-            step(fit, present, check)  # u0 may have begun far off
-        search_u0(fit, present, 0.003 / 2**round_number, 7, check)
+            moved = step(fit, present)
+        if round_number == 0 and search_u0(fit, 0.03, 13):
+            step(fit, present)  # u0 may have begun far off
+        search_u0(fit, 0.003 / 2**round_number, 7)
         if round_number < 3:
             present = likeliest_disturbances(fit, present)
-            say(f'disturbances: {present}')
+            problem.say(f'disturbances: {present}')
     if not moved < CONVERGED:
-        to_rest(fit, present, 6, check)
+        to_rest(fit, present, 6)
     return fit
 
 

@@ -6,6 +6,7 @@ from typing import Any, Self, TypeGuard
 import numpy as np
 
 from . import choices, intervals, structure
+from .linear import solved
 from .logs import Log
 from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
@@ -79,8 +80,7 @@ class Identified:
 @dataclass
 class Finished:
     """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
-    discs that no log shows, what the disturbances have in common that the plant lacks, why the logs give no model, and
-    -2 log likelihood with small disturbances and the surest of those causes."""
+    discs that no log shows, what the disturbances have in common that the plant lacks, why the logs give no model."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
@@ -88,7 +88,6 @@ class Finished:
     round_discs: dict[str, float]
     causes: list[structure.Found] = field(default_factory=list)
     misfit: str = ''
-    cost: float = 0.0
 
 
 def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
@@ -277,6 +276,7 @@ def disagreement(fit: Fit, scores: np.ndarray | None = None) -> dict[str, float]
     out: dict[str, float] = {}
     logs = fit.problem.logs
     inverse = fit.covariance()
+    joint = solved(fit, fit.normal.sum(axis=0), fit.right.sum(axis=0))
     for number, (log, Nl, nl) in enumerate(zip(logs, fit.normal, fit.right)) if len(logs) > 1 else ():
         told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
         d = 1 / np.sqrt(np.diag(Nl)[told])
@@ -287,5 +287,5 @@ def disagreement(fit: Fit, scores: np.ndarray | None = None) -> dict[str, float]
             along, variance = vectors.T[kept] * d, values[kept]
             if scores is not None:  # the mean of 1 / their variance's estimate is larger by draws / (draws - 2)
                 variance = np.sum((along @ scores[number][told])**2, axis=1) / (scores.shape[2] - 2)
-            out[log.name] = float(np.mean((along @ nl[told])**2 / variance))
+            out[log.name] = float(np.mean((along @ (nl - Nl @ joint)[told])**2 / variance))
     return out

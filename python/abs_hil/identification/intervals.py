@@ -1,7 +1,6 @@
 """Intervals of 95 %: by quantising the fitted motion anew with other encoder phases (parametric bootstrap) where only the
 counts' steps disturb, by the information of the filter where the rig wanders. And what the logs say of eccentric discs."""
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import scipy.stats
 from ..core import _core
 from .linear import filtered, solved, to_rest
 from .parameters import COMBINATIONS, WHEELS, disc_of
-from .problem import COUNT_VARIANCE, QUIET, Disturbances, Fit
+from .problem import COUNT_VARIANCE, QUIET, Fit
 from .slots import middles
 
 REPLICATES = 80
@@ -33,7 +32,7 @@ class Spread:
     scores: np.ndarray | None = None
 
 
-def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None) -> Spread:
+def bootstrap(fit: Fit, seed: int = 1) -> Spread:
     """Spread of the estimates over random encoder phases. The estimate is linear in the counts near the solution."""
     problem = fit.problem
     per_count = problem.radians_per_count
@@ -42,7 +41,7 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     late = np.array([[[problem.slots[wheel].error_counts if wheel in problem.slots else 0.0] for wheel in WHEELS]])
     estimates, scores = [], []
     for begin in range(0, REPLICATES, _BATCH):
-        check()
+        problem.check()
         chosen = phases[:, :, begin:begin + _BATCH]
         size = len(fit.scale)
         logs = len(problem.logs)
@@ -72,9 +71,9 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
     return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter, np.concatenate(scores, axis=2))
 
 
-def information(fit: Fit, more: np.ndarray | float = 0.0) -> Spread:
-    """Spread by the filter's information, and by `more` (structure.unsettled)."""
-    return Spread(fit.covariance() + more, fit.covariance() + more)
+def information(fit: Fit, more: np.ndarray | float = 0.0, wider: float = 1.0) -> Spread:
+    """Spread by the filter's information, `wider` times, and by `more` (structure.unsettled)."""
+    return Spread(wider * fit.covariance() + more, wider * fit.covariance() + more)
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
@@ -123,7 +122,7 @@ def _information(fit: Fit, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, fit.covariance()[np.ix_(chosen, chosen)] * np.outer(scale, scale)
 
 
-def settle_discs(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> tuple[Fit, dict[str, float]]:
+def settle_discs(fit: Fit) -> tuple[Fit, dict[str, float]]:
     """The fit without the discs that its logs do not show, and the largest eccentricity that each of these may have, from
     the log that says most (95 %)."""
     largest: dict[str, float] = {}
@@ -140,7 +139,7 @@ def settle_discs(fit: Fit, disturbances: Disturbances, check: Callable[[], None]
         return fit, largest
     fit = fit.changed({}, discs=tuple(wheel for wheel in fit.problem.discs if wheel not in largest))
     fit.values = {key: value for key, value in fit.values.items() if '_disc_' not in key or key in fit.keys}
-    to_rest(fit, disturbances, 4, check)
+    to_rest(fit, fit.disturbances, 4)
     return fit, largest
 
 

@@ -32,7 +32,7 @@ MOST_HALVINGS = 6
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 
 
-def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece], check: Callable[[], None] = lambda: None,
+def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
               fill: Callable[[Piece, np.ndarray], None] | None = None) -> np.ndarray:
     """Fills `linear` of each piece; returns the scale of the parameters' changes. `fill` adds to a piece's columns, before only
     the filter's sums of them are kept."""
@@ -56,7 +56,7 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
         for piece in pieces:
             if piece.log != number:
                 continue
-            check()
+            problem.check()
             piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
             piece.columns = there
             if not simulated.all():
@@ -121,8 +121,7 @@ def disc_waves_rad(problem: Problem, values: Mapping[str, float], log: int, angl
 
 def _duty_step(problem: Problem, u0: float) -> float:
     """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
-    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
-    near = np.sort(np.abs(duties - u0))
+    near = np.sort(np.abs(problem.duties - u0))
     return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
 
 
@@ -164,8 +163,7 @@ def filtered(fit: Fit, pieces: Sequence[Piece], disturbances: Disturbances) -> l
     return out
 
 
-def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
-           high: np.ndarray | None = None) -> np.ndarray:
+def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None, high: np.ndarray | None = None) -> np.ndarray:
     """The likeliest change of the parameters, 0 for those that are not free. The prior decides what the logs do not. A
     parameter that would leave its range stops at the range's end, and the others follow: they may depend on it."""
     x = np.zeros(len(n))
@@ -188,11 +186,11 @@ def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None
     return x
 
 
-def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
+def step(fit: Fit, disturbances: Disturbances) -> float:
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
-    found = linearise_where_better(fit, check)
+    found = linearise_where_better(fit)
     if found is None or disturbances is not fit.disturbances:
         _, found = run_filter(fit, disturbances)
     fit.disturbances = disturbances
@@ -222,25 +220,24 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     return fit.last_step
 
 
-def to_rest(fit: Fit, disturbances: Disturbances, most: int, check: Callable[[], None] = lambda: None,
-            rests: float = CONVERGED) -> None:
+def to_rest(fit: Fit, disturbances: Disturbances, most: int, rests: float = CONVERGED) -> None:
     """Steps until one goes less far than `rests`, at most so many."""
     for _ in range(most):
-        if step(fit, disturbances, check) < rests:
+        if step(fit, disturbances) < rests:
             break
 
 
-def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | None:
+def linearise_where_better(fit: Fit) -> list[Any] | None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
     Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
     last = fit.moved
     if last is None or last.after is not fit.values or last.pieces is not fit.pieces:
-        fit.scale, fit.halvings = linearise(fit.problem, fit.values, fit.pieces, check), 0
+        fit.scale, fit.halvings = linearise(fit.problem, fit.values, fit.pieces), 0
         return None
     found: list[Any] = []
     for halving in range(MOST_HALVINGS + 1):
         try:
-            fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
+            fit.scale = linearise(fit.problem, fit.values, fit.pieces)
             _, found = run_filter(fit, fit.disturbances)
             cost = sum(float(one[2][0]) + one[3] for one in found)
         except ValueError:

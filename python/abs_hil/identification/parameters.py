@@ -9,7 +9,7 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 
-#: the inputs' delay behind the row's time, s; a parameter of logs, not of the plant
+#: the inputs' delay behind the row's time, s; of logs, not of the plant
 DELAY = 'delay_s'
 
 
@@ -70,6 +70,8 @@ CURVATURE = Parameter('brake_curvature', '1', 'flaw', '', floor=0.05, least=-0.9
 RELEASE = Parameter('brake_release_ratio', '1', 'brake', '', least=0.1, most=10.0, prior=20.0, none=1.0)
 FRICTION_FALL = Parameter('friction_fall_s_m', 's/m', 'contact', '', floor=1e-3, most=0.05, prior=20.0)
 FLAWS = (FADING, COOLING, HYSTERESIS, DEAD_TIME, CURVATURE, RELEASE, FRICTION_FALL)
+#: all that may join a form's parameters, in this order
+JOINING = {one.key: one for one in (RATE_LIMIT, *FLAWS, Parameter(DELAY, 's', 'always', '', floor=1e-3))}
 WHEELS = ('upper', 'lower')
 
 

@@ -6,7 +6,7 @@ torques f (N m) added to both bearings, each f a Gauss-Markov process of first o
 the first values p1 are as good as a reading of each, with the precision (scale / (prior p1))^2 of dp.
 """
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self
@@ -18,7 +18,7 @@ from ..options import options
 from .brake_flaws import brake_torques, with_flaws
 from .jitter import jitter_of
 from .logs import Log, Motion, motion_of, segments_of
-from .parameters import DELAY, FLAWS, FRICTION_FALL, RATE_LIMIT, RELEASE, WHEELS, Form, Parameter, base_options, disc_of
+from .parameters import DELAY, FRICTION_FALL, JOINING, RATE_LIMIT, RELEASE, WHEELS, Form, Parameter, base_options, disc_of
 from .slots import Slots, slots_of, weighed
 
 #: an even distribution within one count, counts^2
@@ -46,7 +46,11 @@ class Disturbances:
 
     def times(self, share: float) -> 'Disturbances':
         """A share of them, but not so little that what no rig needs to say would count."""
-        return self if share == 1.0 else dataclasses.replace(self, sd=np.maximum(share * self.sd, LEAST_SD))
+        return self if share == 1.0 else dataclasses.replace(self, sd=share * self.sd).at_least()
+
+    def at_least(self) -> 'Disturbances':
+        """These, or LEAST_SD."""
+        return dataclasses.replace(self, sd=np.maximum(self.sd, LEAST_SD))
 
     def __str__(self) -> str:
         factors = ', '.join(f'{name} {100 * sd:.2g} %' for name, sd in zip(DISTURBANCES[:3], self.sd))
@@ -76,9 +80,10 @@ class Piece:
 @dataclass
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
-    keys of the flaws that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is the
+    keys of JOINING that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is the
     standard deviation of the readings' instants, `jitter_doubt` that of its square, over its square (jitter.py);
-    `pwm_steps` those of the board, if the logs' own duties were finer; `causes` are columns that structure.py fills."""
+    `pwm_steps` those of the board, if the logs' own duties were finer; `causes` are columns that structure.py fills; `say` takes
+    what is done in words, `check` is called often, and may raise to stop."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -88,8 +93,6 @@ class Problem:
     fixed: dict[str, float]
     counts_per_rev: int
     drifts: tuple[str, ...] = ()
-    with_delay: bool = False
-    with_rate_limit: bool = False
     discs: tuple[str, ...] = ()
     flaws: tuple[str, ...] = ()
     slots: Mapping[str, Slots] = field(default_factory=dict)
@@ -97,6 +100,8 @@ class Problem:
     jitter_doubt: float = 0.0
     pwm_steps: int = 0
     causes: tuple[Parameter, ...] = ()
+    say: Callable[[str], None] = lambda _: None
+    check: Callable[[], None] = lambda: None
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
@@ -116,16 +121,18 @@ class Problem:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
         factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
-        limit = (RATE_LIMIT,) if self.with_rate_limit else ()
         discs = tuple(p for log in range(len(self.logs)) for wheel in self.discs for p in disc_of(wheel, log))
-        flaws = tuple(flaw for flaw in FLAWS if flaw.key in self.flaws)
-        return self.form.parameters + limit + factors + flaws + discs + delay + self.causes
+        return (*self.form.parameters, *factors, *discs, *(one for key, one in JOINING.items() if key in self.flaws), *self.causes)
 
     @property
     def keys(self) -> list[str]:
         return [p.key for p in self.parameters]
+
+    @cached_property
+    def duties(self) -> np.ndarray:
+        """Those of the brake that occur in the logs, in order."""
+        return np.unique(np.concatenate([log.brake_pwm for log in self.logs]))
 
     def columns(self, log: int) -> np.ndarray:
         """Places of the parameters that act in one log."""
@@ -220,6 +227,12 @@ class Fit:
         changed, before = dataclasses.replace(self.problem, **problem), dict(zip(self.keys, self.free))
         free = np.array([before.get(key, True) for key in changed.keys])
         return self.copy(problem=changed, values={**self.values, **values}, free=free)
+
+    def without(self, keys: Sequence[str]) -> Self:
+        """A copy that fits none of these keys of JOINING."""
+        fewer = self.changed({}, flaws=tuple(key for key in self.problem.flaws if key not in keys))
+        fewer.values = {key: value for key, value in fewer.values.items() if key in fewer.keys or key not in keys}
+        return fewer
 
     @property
     def keys(self) -> list[str]:

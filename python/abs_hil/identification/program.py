@@ -146,7 +146,7 @@ def _identify(o: argparse.Namespace) -> int:
         from .advice import advise
         from .page import page
         say('what to run next')
-        report = page(found, [] if found.misfit else advise(found, progress.check))
+        report = page(found, [] if found.misfit else advise(found))
     progress.end()
     if not found.refused:
         print('\n'.join(words({**found.parameters, **found.combinations})), flush=True)

@@ -37,6 +37,8 @@ START_SD = 0.5
 DOUBT = 10.0
 #: after a braking, so long a wheel rolls freely, s
 RESTS_S = 0.3
+#: the tyre's parameters are within a factor of exp of this
+FARTHEST = 4.6
 
 
 @dataclass
@@ -73,28 +75,22 @@ def _pieces(problem: Problem) -> _Pieces:
     return _Pieces(parts, *(np.concatenate(column) for column in zip(*columns)))
 
 
-def first_values(problem: Problem, start: Mapping[str, float],
-                 other_form: Mapping[str, float] | None = None) -> dict[str, float]:
+def first_values(problem: Problem, start: Mapping[str, float], other_form: Mapping[str, float] | None = None) -> dict[str, float]:
     """First values of the form's parameters, and of the brake's dead time where the logs show one. `start` fills what they do not
     tell; `other_form`: first values of another form, from the same logs: all but the tyre's hold here, too."""
     pieces = _pieces(problem)
-    value = {p.key: float(start[p.key]) for p in problem.form.parameters}
-    value.update(problem.fixed)
-    if other_form is not None:
-        value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
-        _tyre(value, pieces, problem)
-        return value
-    if 'r1_m' not in problem.fixed:
+    value = {p.key: float(start[p.key]) for p in problem.form.parameters} | problem.fixed
+    if other_form is None:
         rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
         for rest_s in (1.0, RESTS_S):  # after a locked wheel, rolling takes its time
             rolling = rolls & ~_braked(pieces, problem.logs, rest_s)
-            if rolling.sum() > 3:
+            if rolling.sum() > 3 and 'r1_m' not in problem.fixed:
                 value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
-    _scan_brake(value, pieces, problem)
-    for p in problem.form.parameters:
-        if p.key not in problem.fixed:
-            value[p.key] = float(np.clip(value[p.key], p.least, p.most))
+        value.update(_scanned_brake(value, pieces, problem))
+        value.update({p.key: float(np.clip(value[p.key], p.least, p.most)) for p in problem.form.parameters} | problem.fixed)
+    else:
+        value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
     _tyre(value, pieces, problem)
     return value
 
@@ -107,7 +103,7 @@ def _braked(pieces: _Pieces, logs: Sequence[Log], rest_s: float) -> np.ndarray:
         memory = max(1, round(rest_s / log.period_s))
         recent = _integral(log, (log.brake_pwm > 0).astype(float))
         acts.append(recent[last] - recent[np.maximum(first - memory, 0)] > 0)
-    return np.concatenate(acts) if acts else np.empty(0, dtype=bool)
+    return np.concatenate(acts)
 
 
 #: columns of the linear fit
@@ -117,14 +113,15 @@ _LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_st
 _FLOORS = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
 
 
-def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
+def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem) -> dict[str, float]:
+    """Bearings, motor and brake: the linear ones at the likeliest u0, c31 and dead time."""
     logs, fixed = problem.logs, problem.fixed
     r1, r2, J2 = value['r1_m'], problem.given['r2_m'], problem.given['J2_kg_m2']
     zero = np.zeros(len(pieces.duration))
     turning1, turning2 = pieces.turning.T
     motor = {'motor_stall_torque_Nm': pieces.motor, 'back_emf': -pieces.motor_speed}
     contact, apart = ~pieces.apart, pieces.apart
-    duties = np.unique(np.concatenate([log.brake_pwm[log.brake_pwm > 0] for log in logs] or [np.empty(0)]))
+    duties = problem.duties[problem.duties > 0.0]
 
     # The scan needs no more than every fourth millisecond.
     thin = [max(1, round(COARSE_S / log.period_s)) for log in logs]
@@ -213,25 +210,20 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
             scan(near(best[2], span), best[3] * np.geomspace(0.7, 1.4, 5), best[4] + COARSE_S * np.arange(-1, 2))
         else:
             best = instant
-    if best[4] > 0.0 and best[1][_LINEAR.index('b2_Nm')] < 0.0:
-        value[DEAD_TIME.key] = float(best[4])
-    linear = dict(zip(_LINEAR, best[1]))
-    # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
-    acted = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
-    for key in _LINEAR:
-        if key in value and key not in fixed and (acted or key not in ('b1_Nm', 'b2_Nm')):
-            value[key] = float(linear[key])
+    linear = dict(zip(_LINEAR, best[1].tolist()))
+    found = {key: linear[key] for key in _LINEAR if key in value}
     for key, floor in _FLOORS.items():
-        if key not in fixed:
-            value[key] = max(value[key], 0.1 * max(abs(value[key]), floor))
-    if 'J1_kg_m2' not in fixed:
-        value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
-    if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
-        value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / linear['back_emf'], 20, 2000))
-    if 'u0' not in fixed and acted:
-        value['u0'] = best[2]
-    if 'c31_per_s' not in fixed and acted:
-        value['c31_per_s'] = best[3]
+        found[key] = max(found[key], 0.1 * max(abs(found[key]), floor))
+    if pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
+        stall = problem.fixed.get('motor_stall_torque_Nm', found['motor_stall_torque_Nm'])
+        found['motor_no_load_speed_rad_s'] = float(np.clip(stall / linear['back_emf'], 20, 2000))
+    found.update(u0=float(best[2]), c31_per_s=float(best[3]))
+    if best[4] > 0.0 > linear['b2_Nm']:
+        found[DEAD_TIME.key] = float(best[4])
+    if linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']:
+        return found
+    # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
+    return {key: number for key, number in found.items() if key not in ('b1_Nm', 'b2_Nm', 'u0', 'c31_per_s')}
 
 
 def _robust(A: np.ndarray, y: np.ndarray, pull: np.ndarray,
@@ -272,33 +264,21 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
     w1, w2, Tb = np.concatenate(middles)[contact].T
     force = force[contact]
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
-    begun = np.array([value[p.key] for p in tyre])
-    line = np.array([p.least < 0.0 for p in tyre])  # moves along a straight line, the others by factors
-    lows = np.array([max(p.least, at - 0.5 if along else 1e-2 * at) for p, at, along in zip(tyre, begun, line)])
-    highs = np.array([min(p.most, at + 0.5 if along else 1e2 * at) for p, at, along in zip(tyre, begun, line)])
+    keys, least, most = zip(*((p.key, p.least, p.most) for p in tyre))
+    begun = np.array([value[key] for key in keys])
+    line = np.less(least, 0.0)  # those that may be negative move along a straight line, the others by factors
 
-    def to_x(values: np.ndarray) -> np.ndarray:
-        return np.where(line, 10.0 * values, np.log(np.where(line, 1.0, values)))
-
-    def from_x(x: np.ndarray) -> np.ndarray:
-        return np.clip(np.where(line, 0.1 * x, np.exp(np.where(line, 0.0, x))), lows, highs)
-    x_start = to_x(begun)
+    def from_x(x: np.ndarray) -> list[float]:
+        return np.clip(np.where(line, begun + 0.1 * x, begun * np.exp(np.where(line, 0.0, x))), least, most).tolist()
 
     def residual(x: np.ndarray) -> np.ndarray:
-        values = from_x(x)
         try:
-            modelled = _core.tyre_forces_N(base, shared + list(zip([p.key for p in tyre], values.tolist())), w1, w2, Tb)
+            modelled = _core.tyre_forces_N(base, shared + list(zip(keys, from_x(x))), w1, w2, Tb)
         except ValueError:  # this friction would wedge the lever
             return np.full(len(force) + len(x), 100.0)
         # What the force does not tell, as the peak's height in gentle braking, stays near the start.
-        return np.concatenate([np.asarray(modelled) - force, 2.0 * (x - x_start)])
-
-    fits = []
-    for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes
-        heights = np.array([factor if p.key in form.road and not along else 1.0 for p, along in zip(tyre, line)])
-        x0 = to_x(np.where(line, begun, np.clip(begun * heights, 1.05 * lows, 0.9 * highs)))
-        fits.append(scipy.optimize.least_squares(residual, x0, bounds=(to_x(lows), to_x(highs)), loss='soft_l1',
-                                                 f_scale=1.0, max_nfev=60))
-    best = min(fits, key=lambda fit: fit.cost)
-    for p, number in zip(tyre, from_x(best.x)):
-        value[p.key] = float(number)
+        return np.concatenate([np.asarray(modelled) - force, 2.0 * x])
+    heights = np.isin(keys, form.road) & ~line  # their starts decide the side of the peak that a fit takes
+    best = min((scipy.optimize.least_squares(residual, heights * np.log(factor), bounds=(-FARTHEST, FARTHEST), loss='soft_l1',
+                                             max_nfev=60) for factor in (1.0, 0.6, 1.6)), key=lambda fit: float(fit.cost))
+    value.update(zip(keys, from_x(best.x)))

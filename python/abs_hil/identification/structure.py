@@ -22,7 +22,7 @@ import numpy as np
 from .brake_flaws import brake_torques, leaky
 from .linear import _relative, by_windows, keep_normals, left_out_cost, linearise, run_filter, solved, to_rest
 from .logs import Log
-from .parameters import COOLING, CURVATURE, DEAD_TIME, FADING, FLAWS, FRICTION_FALL, HYSTERESIS, RELEASE, WHEELS, Parameter
+from .parameters import FLAWS, JOINING, WHEELS, Parameter
 from .problem import DISTURBANCES, Disturbances, Fit, Piece, inverse
 
 #: a cause is believed if its coefficient is this many standard deviations from 0
@@ -65,24 +65,20 @@ class Cause:
     against: str = ''
 
 
-def _of_flaw(words: str, unit: str, acts: str, flaw: Parameter, against: str = '') -> Cause:
-    return Cause(words, unit, acts, flaw=flaw.key, against=against)
-
-
 CAUSES = (
-    _of_flaw('the brake gets weaker with the energy put in', 'per J', 'brake', FADING,
-             'the brake gets stronger with the energy put in'),
-    _of_flaw('the brake recovers as it cools', 'of its heat per s', 'brake', COOLING,
-             'the brake fades more the longer it stays hot'),
-    _of_flaw('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', HYSTERESIS,
-             'the brake holds less after its duty fell than after it rose'),
-    _of_flaw('the brake acts late', 's', 'brake', DEAD_TIME, 'the brake acts early'),
-    _of_flaw('the brake lets go faster than it takes hold', 'of its lag', 'brake', RELEASE,
-             'the brake lets go more slowly than it takes hold'),
-    _of_flaw("the brake's torque is no straight line of its duty", 'of b(u) at small torques', 'brake', CURVATURE),
+    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', flaw='brake_fading_per_J',
+          against='the brake gets stronger with the energy put in'),
+    Cause('the brake recovers as it cools', 'of its heat per s', 'brake', flaw='brake_cooling_per_s',
+          against='the brake fades more the longer it stays hot'),
+    Cause('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', flaw='brake_hysteresis',
+          against='the brake holds less after its duty fell than after it rose'),
+    Cause('the brake acts late', 's', 'brake', flaw='brake_dead_time_s', against='the brake acts early'),
+    Cause('the brake lets go faster than it takes hold', 'of its lag', 'brake', flaw='brake_release_ratio',
+          against='the brake lets go more slowly than it takes hold'),
+    Cause("the brake's torque is no straight line of its duty", 'of b(u) at small torques', 'brake', flaw='brake_curvature'),
     Cause("the brake's torque changes with the upper wheel's speed", 'per rad/s', 'brake', lambda s: s.omega_rad_s[:, 0]),
-    _of_flaw('the friction falls with the sliding speed', 'per m/s', 'road', FRICTION_FALL,
-             'the friction rises with the sliding speed'),
+    Cause('the friction falls with the sliding speed', 'per m/s', 'road', flaw='friction_fall_s_m',
+          against='the friction rises with the sliding speed'),
     Cause('the friction is no straight line of the sliding speed', 'per (m/s)^2', 'road', lambda s: s.sliding_m_s**2),
     Cause("the friction changes with the lower wheel's speed", 'per rad/s', 'road', lambda s: s.omega_rad_s[:, 1]),
     Cause('the friction changes with time', 'per s', 'road', lambda s: s.log.time_s - s.log.time_s[0]),
@@ -179,7 +175,7 @@ def _widened(fit: Fit) -> tuple[Fit, list[tuple[Cause, np.ndarray]]]:
             for number, of in enumerate(follows[0]) if not causes[number].flaw}
     columns = tuple(Parameter(key, '', 'cause', '', floor=1.0, prior=1e9) for some in keys.values() for key in some)
     wide = fit.changed({flaw.key: flaw.none for flaw in missing} | {p.key: 0.0 for p in columns},
-                       flaws=tuple(flaw.key for flaw in FLAWS), causes=columns)
+                       flaws=(*fit.problem.flaws, *(flaw.key for flaw in missing)), causes=columns)
     wide.free &= np.isin(wide.keys, fit.keys)
 
     def fill(piece: Piece, scale: np.ndarray) -> None:
@@ -274,45 +270,33 @@ def _signals(fit: Fit) -> list[Signals]:
     return out
 
 
-def explained(fit: Fit, disturbances: Disturbances, check: Callable[[], None],
-              say: Callable[[str], None]) -> tuple[Fit, list[Found]]:
+def explained(fit: Fit, disturbances: Disturbances) -> tuple[Fit, list[Found]]:
     """The fit with those flaws that explain what the disturbances have in common, and the causes that are left,
     surest first: none of them is in the plant."""
+    causes = causes_of(fit, disturbances)
     while True:
-        check()
-        causes = causes_of(fit, disturbances)
         left = [one for one in causes if one.sure > SURE]
         if causes and not left and causes[0].beside and causes[0].beside.sure > SURE:
             left = [causes[0], causes[0].beside]  # each alone hides the other
-        better = _with_a_flaw(fit, left, disturbances, check) if left else None
-        if better is None:
+        for one in left:
+            flawed = _with_flaw(fit, one, disturbances) if one.flaw and one.sure >= WORTH_A_TRY * left[0].sure else None
+            then = [] if flawed is None else causes_of(flawed, disturbances)
+            still = max((other.sure for other in then if other.cause is left[0].cause), default=0.0)
+            if flawed is not None and (one is left[0] or still < STILL_THERE * left[0].sure):
+                fit, causes = flawed, then
+                fit.problem.say(f'{one.cause.words}: fitted as {one.flaw} = {fit.values[one.flaw]:.3g}')
+                break
+        else:
             return fit, left
-        fit, taken = better
-        say(f'{taken.words}: fitted as {taken.flaw} = {fit.values[taken.flaw]:.3g}')
 
 
-def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
-                 check: Callable[[], None]) -> tuple[Fit, Cause] | None:
-    surest = causes[0]
-    for one in causes:
-        if not one.flaw or one.sure < WORTH_A_TRY * surest.sure:
-            continue
-        flawed = _with_flaw(fit, one, disturbances, check)
-        if flawed is not None and (one is surest or all(other.cause is not surest.cause or other.sure < STILL_THERE * surest.sure
-                                                        for other in causes_of(flawed, disturbances))):
-            return flawed, one.cause
-    return None
-
-
-def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
+def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances) -> Fit | None:
     """The fit with one more flaw; None if it is not there after all: not sure by the likelihood, or against what logs that
     are left out say."""
-    key = found.flaw
-    flaw = next(flaw for flaw in FLAWS if flaw.key == key)
-    value = min(flaw.none + found.coefficient, 0.9 * flaw.most)
-    flawed = fit.changed({key: value}, flaws=(*fit.problem.flaws, key))
+    key, flaw = found.flaw, JOINING[found.flaw]
+    flawed = fit.changed({key: min(flaw.none + found.coefficient, 0.9 * flaw.most)}, flaws=(*fit.problem.flaws, key))
     less = disturbances.times(found.share)
-    to_rest(flawed, less, 6, check)
+    to_rest(flawed, less, 6)
     with_it, without = _against(flawed, less, key), min(_against(fit, disturbances.times(share)) for share in {1.0, found.share})
     least = SURE**2 if found.sure > SURE else 0.0  # one that another hides is sure with that one only
     noise = 2.0 * found.sure  # one standard deviation of what the logs left out say of a cause that is this sure
