@@ -502,10 +502,10 @@ def test_a_step_that_makes_it_worse_is_halved(logs, start):
     fit = start_fit(problem, {key: value for key, value in problem.base.values().items() if isinstance(value, float)})
     step(fit, fit.disturbances)
     good, states = fit.values, [piece.states for piece in fit.pieces]
-    linearise_where_better(fit, lambda: None)
+    linearise_where_better(fit)
     cost = float(fit.cost.sum())
     # Eight times the friction is a plant that no log here comes from: three halvings or more lead back.
     fit.values = {**good, 'theta_N': 8 * good['theta_N']}
-    fit.moved = Move(good, fit.values, states, fit.pieces, cost)
-    linearise_where_better(fit, lambda: None)
+    fit.moved = Move(good, states, cost)
+    linearise_where_better(fit)
     assert good['theta_N'] < fit.values['theta_N'] <= 1.9 * good['theta_N']

@@ -86,7 +86,7 @@ def with_steps(fit: Fit) -> Iterator[Fit]:
     for cost, (problem, _) in sorted(zip(costs, others), key=lambda one: one[0]):
         if cost < present - CLEAR_GAIN:
             problem.say(f'duties of {problem.pwm_steps} steps')
-            yield fit.copy(problem=problem, moved=None)
+            yield fit.copy(problem=problem)
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:

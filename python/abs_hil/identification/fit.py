@@ -212,7 +212,8 @@ def finish_fit(fit: Fit) -> Fit:
 def disturbed_fit(fit: Fit) -> Fit:
     """A fit for a rig whose factors wander: estimates how much, by maximum likelihood, along with the parameters."""
     problem = fit.problem
-    fit = dataclasses.replace(fit, pieces=pieces_of(problem, fit.values, WINDOW_DISTURBED_S), window_s=WINDOW_DISTURBED_S)
+    fit = dataclasses.replace(fit, pieces=pieces_of(problem, fit.values, WINDOW_DISTURBED_S), window_s=WINDOW_DISTURBED_S,
+                              moved=None)
     present = Disturbances.of(0.02, 0.01, 0.2)
     for round_number in range(4):
         for _ in range(2 if round_number == 0 else 1):

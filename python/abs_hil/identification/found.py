@@ -142,7 +142,7 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             parameters[p.key] = Estimate.fixed(value, p.unit)
             continue
         if p.key == 'u0':
-            parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
+            parameters[p.key] = _u0(value, finished.gaps if _known(parameters.get('b1_Nm')) else [])
             if _told_by_no_log(parameters, notes):
                 continue
             if parameters[p.key].status != 'identified':
@@ -257,16 +257,17 @@ def _known(estimate: Estimate | None) -> TypeGuard[Estimate]:
     return estimate is not None and estimate.status in ('identified', 'fixed')
 
 
-def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
-    """identified if the logs exclude smaller and larger values, bounded if one of them. Without the brake's line, which tells
-    what a duty above u0 does, nothing is excluded."""
-    value = fit.values['u0']
-    smaller, larger = intervals.excluded(gaps)
-    if not (smaller or larger):
+def _u0(value: float, gaps: list[tuple[float, float, float]]) -> Estimate:
+    """From the first to the last gap between duties that is not less likely than the best by 95 %: identified if smaller and
+    larger values are, bounded if one of them is. Without the brake's line, which tells what a duty does, there are no gaps."""
+    least = min((gap[2] for gap in gaps), default=0.0) + intervals.LIKELY
+    likely = [i for i, gap in enumerate(gaps) if gap[2] <= least] or [0]
+    below, above = gaps[:likely[0]], gaps[likely[-1] + 1:]
+    if not (below or above):
         return Estimate(value, None, None, 'not-identifiable', '1')
-    low, high = intervals.u0_interval(gaps)
-    certain = smaller and larger and high - low <= LARGEST_SD * value
-    return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
+    low, high = below[-1][1] if below else gaps[0][0], above[0][0] if above else 1.0
+    certain = below and above and high - low <= LARGEST_SD * value
+    return Estimate(value, low, high, 'identified' if certain else 'bounded', '1')
 
 
 def disagreement(fit: Fit, scores: np.ndarray | None = None) -> dict[str, float]:

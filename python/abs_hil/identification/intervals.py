@@ -90,24 +90,6 @@ def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
     return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs @ gradient)))
 
 
-def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:
-    """Whether the logs exclude a smaller and a larger u0 than those that are likely."""
-    if len(gaps) < 2:
-        return False, False
-    least = min(gap[2] for gap in gaps) + LIKELY
-    return gaps[0][2] > least, gaps[-1][2] > least
-
-
-def u0_interval(gaps: list[tuple[float, float, float]]) -> tuple[float, float]:
-    """From the first to the last gap between duties that is not less likely than the best by 95 %, or that lies beside
-    one that was not tried."""
-    least = min(gap[2] for gap in gaps) + LIKELY
-    kept = [i for i, gap in enumerate(gaps) if gap[2] <= least]
-    low = gaps[kept[0] - 1][1] if kept[0] > 0 else gaps[0][0]
-    high = gaps[kept[-1] + 1][0] if kept[-1] + 1 < len(gaps) else gaps[-1][1]
-    return low, high
-
-
 def _places(fit: Fit, wheel: str) -> np.ndarray:
     """Of sine and cosine of each log among the parameters, shape (logs, 2)."""
     keys = fit.keys

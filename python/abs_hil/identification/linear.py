@@ -214,9 +214,8 @@ def step(fit: Fit, disturbances: Disturbances) -> float:
         piece.states = states + 0.5**shorter * (piece.states - states) if shorter else piece.states
     with np.errstate(over='ignore'):
         moved = np.clip(np.where(sizes, values * np.exp(x), values + fit.scale * x), least, most)
-    old = fit.values
+    fit.moved = Move(fit.values, before, float(fit.cost.sum()), shorter)
     fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
-    fit.moved = Move(old, fit.values, before, fit.pieces, float(fit.cost.sum()), shorter)
     return fit.last_step
 
 
@@ -231,7 +230,7 @@ def linearise_where_better(fit: Fit) -> list[Any] | None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
     Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
     last = fit.moved
-    if last is None or last.after is not fit.values or last.pieces is not fit.pieces:
+    if last is None:
         fit.scale, fit.halvings = linearise(fit.problem, fit.values, fit.pieces), 0
         return None
     found: list[Any] = []

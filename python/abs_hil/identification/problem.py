@@ -186,11 +186,9 @@ class Problem:
 
 @dataclass
 class Move:
-    """The last step of a fit: values before and after, states before, -2 log likelihood before, and how often it was halved."""
+    """The last step of a fit: values, states and -2 log likelihood before, and how often it was halved."""
     before: dict[str, float]
-    after: dict[str, float]
     states: list[np.ndarray]
-    pieces: list[Piece]
     cost: float
     shorter: int = 0
 
@@ -220,7 +218,8 @@ class Fit:
 
     def copy(self, **changes: Any) -> Self:
         """A fit that can go on without this one."""
-        return dataclasses.replace(self, **{'pieces': [dataclasses.replace(piece) for piece in self.pieces], **changes})
+        pieces = [dataclasses.replace(piece) for piece in self.pieces]
+        return dataclasses.replace(self, **{'pieces': pieces, 'moved': None, **changes})
 
     def changed(self, values: Mapping[str, float], **problem: Any) -> Self:
         """A copy for a problem that is changed: with `values` of its new parameters, which are free, and without old ones."""

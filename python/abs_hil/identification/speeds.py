@@ -50,20 +50,19 @@ FRICTION, FULL, LAG = 'friction_over_start', 'brake_torque_at_{:g}_Nm', 'c31_per
 
 @dataclass(frozen=True)
 class Free:
-    """A number that is fitted: first value and range; by its logarithm if `log`, else in hundredths; trace: the one that it
-    belongs to, -1 for all."""
+    """A number that is fitted: first value and range; by its logarithm if it is above 0, else in hundredths; trace: the one that
+    it belongs to, -1 for all."""
     key: str
     first: float
     least: float
     most: float
-    log: bool = True
     trace: int = -1
 
     def to_x(self, value: float) -> float:
-        return math.log(value) if self.log else 100.0 * value
+        return math.log(value) if self.least > 0.0 else 100.0 * value
 
     def value(self, x: float) -> float:
-        return math.exp(x) if self.log else 0.01 * x
+        return math.exp(x) if self.least > 0.0 else 0.01 * x
 
 
 @dataclass
@@ -96,7 +95,7 @@ class Model:
         self.duties = sorted({float(u) for trace in traces for u in trace.brake_pwm if u > 0.0})
         if not self.duties:
             raise ValueError('in no trace does the brake act; give one with a brake duty')
-        shared = [Free(DEAD_TIME.key, 0.01, 0.0, DEAD_TIME.most, False), Free(LAG, 20.0, 3.0, FASTEST_PER_S),
+        shared = [Free(DEAD_TIME.key, 0.01, 0.0, DEAD_TIME.most), Free(LAG, 20.0, 3.0, FASTEST_PER_S),
                   Free(FRICTION, 1.0, 0.1, 5.0)]
         for key, value, factor in (('J1_kg_m2', self.given['J1_kg_m2'], 2.5), (self.knee, max(self.given[self.knee], 1e-12), 50.0),
                                    *((FULL.format(duty), max(self.given['b1_Nm'] * duty + self.given['b2_Nm'], 0.1), 10.0)
@@ -111,7 +110,7 @@ class Model:
         begins = float(np.median(first.value[:3])) / (self.radii[first.kind] if first.at_rim else 1.0)
         kinds = {one.kind for one in trace.channels}
         return ([Free('begins', begins, 0.5 * begins, 1.5 * begins, trace=number)]
-                + [Free('edge', 0.0, -EDGE_S, EDGE_S, False, number)] * bool(np.isfinite(trace.first_edge_s))
+                + [Free('edge', 0.0, -EDGE_S, EDGE_S, number)] * trace.edge_fitted
                 + [Free(f'scale_{kind}', 1.0, 0.9, 1.1, trace=number) for kind in ('slip', 'lower')
                    if kind in kinds and len(kinds) > 1 and kind not in trace.scales])
 
@@ -272,7 +271,7 @@ def _assembled(model: Model, x: np.ndarray, covariance: np.ndarray, groups: int,
             continue
         e = found.parameters[key] = Estimate.normal(value, reach / WIDTH, unit, reach <= LARGEST_HALF_WIDTH * abs(value))
         own = next((one for one in model.shared if one.key == key), None)
-        if own is not None and own.log:
+        if own is not None and own.least > 0.0:
             e.low, e.high = value * math.exp(-reach / value), value * math.exp(reach / value)
         if own is not None and e.low is not None and e.high is not None:
             e.low = max(e.low, own.least)
@@ -280,7 +279,7 @@ def _assembled(model: Model, x: np.ndarray, covariance: np.ndarray, groups: int,
                 e.status, e.high = 'bounded', None
                 found.notes.append(f'the traces do not tell a largest {key}')
     doubted: list[tuple[tuple[str, ...], str]] = []
-    if all(np.isfinite(trace.first_edge_s) and trace.applications < 2 for trace in model.traces):
+    if all(trace.edge_fitted and np.sum(np.diff(trace.brake_pwm, prepend=0.0) > 0.0) < 2 for trace in model.traces):
         doubted.append(((DEAD_TIME.key,), 'when the brake began, and so no dead time'))
     if len(model.duties) == 1:
         doubted.append((('b1_Nm', 'b2_Nm'), "how the brake's torque depends on its duty: they have one"))

@@ -107,8 +107,9 @@ def _braked(pieces: _Pieces, logs: Sequence[Log], rest_s: float) -> np.ndarray:
 
 
 #: columns of the linear fit
-_LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm',
-           'b2_Nm')
+_LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm', 'b2_Nm')
+#: cost, linear values, u0, c31, dead time
+_Scanned = tuple[float, np.ndarray, float, float, float]
 #: the least sizes of those that may be 0
 _FLOORS = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
 
@@ -171,45 +172,32 @@ def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem
         if rows.any():
             pull, pulls_to = _robust(unbraked[rows][:, free], target[rows], pull, pulls_to)[2:]
 
-    def fit(u0: float, c31: float, dead_s: float = 0.0) -> tuple[float, np.ndarray]:
+    def fit(u0: float, c31: float, dead_s: float) -> tuple[float, np.ndarray]:
         A, y = unbraked[braked], target[braked]
         for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31, dead_s)):
             A[:, _LINEAR.index(key)] = (brakes * column[of_row])[braked]
-            if key in fixed:
-                y = y - A[:, _LINEAR.index(key)] * fixed[key]
+            y = y - A[:, _LINEAR.index(key)] * fixed.get(key, 0.0)
         full = guess.copy()
         full[free], cost, *_ = _robust(A[:, free], y, pull, pulls_to)
         return cost, full
 
-    u0s, c31s = [value['u0']], [value['c31_per_s']]
-    best = *fit(value['u0'], value['c31_per_s']), value['u0'], value['c31_per_s'], 0.0
-    if 'c31_per_s' not in fixed and len(duties):
-        c31s = list(np.geomspace(4.0, 400.0, 16))
-    if 'u0' not in fixed and len(duties):
-        u0s = sorted({float(u) for u in np.quantile(duties, np.linspace(0, 1, 24))} | {float(duties[0])})
-
-    def scan(u0s: Iterable[float], c31s: Iterable[float], deads_s: Iterable[float]) -> None:
-        nonlocal best
-        for u0, c31, dead_s in itertools.product(u0s, c31s, deads_s):
-            cost, found = fit(u0, c31, dead_s)
-            if cost < best[0]:
-                best = cost, found, u0, c31, dead_s
+    def scan(best: _Scanned, u0s: Iterable[float], c31s: Iterable[float], deads_s: Iterable[float] = (0.0,)) -> _Scanned:
+        u0s, c31s = ([value[key]] if key in fixed else some for key, some in (('u0', u0s), ('c31_per_s', c31s)))
+        return min([best, *((*fit(*one), *one) for one in itertools.product(u0s, c31s, deads_s))], key=lambda one: one[0])
 
     def near(u0: float, width: float) -> list[float]:
-        some = duties[(duties > u0 - width) & (duties < u0 + width)] if len(u0s) > 1 else np.array([u0])
-        return sorted({float(u) for u in np.quantile(some, np.linspace(0, 1, 6))} | {u0}) if len(some) else [u0]
+        some = duties[np.abs(duties - u0) < width]
+        return sorted({*np.quantile(some, np.linspace(0, 1, 6)).tolist(), u0}) if some.size else [u0]
 
-    several, span = len(c31s) > 1, float(np.ptp(duties)) / 24 if len(duties) else 0.0
-    for round_number in range(3):
-        scan(u0s if round_number == 0 else near(best[2], span / 4**(round_number - 1)), c31s, [0.0])
-        c31s = list(best[3] * np.geomspace(*((0.93, 1.07) if round_number else (0.8, 1.25)), 5)) if several else c31s
-    if several:
-        instant = best
-        scan([best[2]], np.geomspace(8.0, 600.0, 8), np.arange(COARSE_S, LARGEST_DEAD_S, COARSE_S))
-        if best[0] < (1.0 - WORTH_DEAD) * instant[0]:
-            scan(near(best[2], span), best[3] * np.geomspace(0.7, 1.4, 5), best[4] + COARSE_S * np.arange(-1, 2))
-        else:
-            best = instant
+    best = *fit(value['u0'], value['c31_per_s'], 0.0), value['u0'], value['c31_per_s'], 0.0
+    if duties.size:
+        span = float(np.ptp(duties)) / 24
+        best = scan(best, sorted({*np.quantile(duties, np.linspace(0, 1, 24)).tolist()}), np.geomspace(4.0, 400.0, 16))
+        for width, factor in ((span, 1.25), (span / 4, 1.08)):
+            best = scan(best, near(best[2], width), best[3] * np.geomspace(1.0 / factor, factor, 5))
+        late = scan(best, [best[2]], np.geomspace(8.0, 600.0, 8), np.arange(COARSE_S, LARGEST_DEAD_S, COARSE_S))
+        if late[0] < (1.0 - WORTH_DEAD) * best[0]:
+            best = scan(late, near(late[2], span), late[3] * np.geomspace(0.7, 1.4, 5), late[4] + COARSE_S * np.arange(-1, 2))
     linear = dict(zip(_LINEAR, best[1].tolist()))
     found = {key: linear[key] for key in _LINEAR if key in value}
     for key, floor in _FLOORS.items():

@@ -53,14 +53,9 @@ class Trace:
     motor_pwm: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
-    def first_edge_s(self) -> float:
-        """The instant at which the brake began, if that is to be fitted; nan otherwise."""
-        return self.keys.get('brake_from_s', np.nan)
-
-    @property
-    def applications(self) -> int:
-        """How many times the brake took hold."""
-        return int(np.sum(np.diff(self.brake_pwm, prepend=0.0) > 0.0))
+    def edge_fitted(self) -> bool:
+        """Whether the instant at which the brake began is to be fitted."""
+        return 'brake_from_s' in self.keys
 
 
 def load_trace(path: PathLike, keys: Mapping[str, float]) -> Trace:
