@@ -182,7 +182,8 @@ def _settled(quiet: Fit, seed: int) -> Finished:
 def _explained(fit: Fit, seed: int) -> Finished:
     """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
     fit.problem.say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
-    if (flawed := _flawed(fit)) is not fit and (quiet := _quiet(flawed)) is not None:
+    flawed, first_causes = _flawed(fit)
+    if flawed is not fit and (quiet := _quiet(flawed)) is not None:
         return _settled(quiet, seed)
     fit = disturbed_fit(flawed)
     limited = choices.sought(fit)
@@ -190,6 +191,8 @@ def _explained(fit: Fit, seed: int) -> Finished:
     while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
         fit = disturbed_fit(found[0])
     causes = found[1]
+    if first_causes and any(one.cause is first_causes[0].cause for one in causes):
+        causes = first_causes  # surer
     fit, round_discs = intervals.settle_discs(choices.settle(fit))
     gaps = likely_u0(fit)
     misfit = ''
@@ -227,16 +230,17 @@ def _left_by(quiet: Fit) -> str:
     return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
 
 
-def _flawed(fit: Fit) -> Fit:
-    """The fit with the flaws that it shows while small disturbances are allowed, if it rests there."""
+def _flawed(fit: Fit) -> tuple[Fit, list[structure.Found]]:
+    """The fit with the flaws that it shows while small disturbances are allowed, if it rests there, and the causes that are left:
+    the disturbances that the likelihood asks for would take them up."""
     near = fit.without([RATE_LIMIT.key])  # it may stand for a flaw
     to_rest(near, SMALL, 10, RESTS)
     if search_u0(near, 0.01, 9):
         to_rest(near, SMALL, 3, RESTS)
     if not (near.rms_counts <= LARGEST_RMS and near.last_step < RESTS):
-        return fit  # too far off to tell anything
-    flawed, _ = structure.explained(near, SMALL)
-    return fit if flawed is near else structure.explained(choices.sought(flawed), SMALL)[0]
+        return fit, []  # too far off to tell anything
+    flawed, left = structure.explained(near, SMALL)
+    return (fit, left) if flawed is near else structure.explained(choices.sought(flawed), SMALL)
 
 
 def _refuse_odd(logs: Sequence[Log], plant: Mapping[str, float], counts_per_rev: int) -> None:

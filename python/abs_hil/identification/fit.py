@@ -128,33 +128,30 @@ def start_fit(problem: Problem, start: Mapping[str, float], other_form: Fit | No
     """First values and a few rounds with large disturbances: near the truth, whatever the start. What `other_form` found of
     the same logs is not sought again."""
     if other_form is not None:
-        problem = dataclasses.replace(problem, motions=other_form.problem.motions)
-        discs = {p.key: other_form.first[p.key] for p in problem.parameters if p.acts == 'reading'}
-        return _started(problem, start, discs, other_form.first)
-    fit = _started(problem, start)
+        known = other_form.first
+        return _started(dataclasses.replace(problem, motions=other_form.problem.motions), start, known, known)
+    fit = _started(problem, start, {})
     discs = {p.key: fit.values[p.key] for p in problem.parameters if p.acts == 'reading'}
     if all(abs(value) < SMALL_DISC_RAD for value in discs.values()):
         return fit
     # Speeds that an eccentric disc does not sway give better first values.
     motions = []
     for number, (log, motion) in enumerate(zip(problem.logs, problem.motions)):
-        read = log.counts * problem.radians_per_count
-        turned = motion_of(dataclasses.replace(log, counts=log.counts - disc_waves_rad(problem, discs, number, read)
-                                               / problem.radians_per_count), problem.counts_per_rev)
+        waves = disc_waves_rad(problem, discs, number, log.counts * problem.radians_per_count) / problem.radians_per_count
+        turned = motion_of(dataclasses.replace(log, counts=log.counts - waves), problem.counts_per_rev)
         motions.append(dataclasses.replace(motion, smooth_rad=turned.smooth_rad, speed_rad_s=turned.speed_rad_s))
     return _started(dataclasses.replace(problem, motions=motions), start, discs)
 
 
-def _started(problem: Problem, start: Mapping[str, float],
-             discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
+def _started(problem: Problem, start: Mapping[str, float], discs: Mapping[str, float],
+             other_form: Mapping[str, float] | None = None) -> Fit:
     first = first_values(problem, start, other_form)
     problem = dataclasses.replace(problem, flaws=tuple(flaw.key for flaw in FLAWS if flaw.key in first))
     values = {DELAY: 0.0, RATE_LIMIT.key: problem.fixed.get(RATE_LIMIT.key, 0.0), **first, **dict.fromkeys(problem.factors, 1.0),
-              **{p.key: 0.0 for p in problem.parameters if p.acts == 'reading'}, **(discs or {})}
+              **{p.key: discs.get(p.key, 0.0) for p in problem.parameters if p.acts == 'reading'}}
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
     fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), level(LEVELS[0]), WINDOW_S, free, dict(values))
-    for _ in range(2):
-        step(fit, level(LEVELS[0]))
+    to_rest(fit, level(LEVELS[0]), 2)
     return fit
 
 

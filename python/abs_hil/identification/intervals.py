@@ -78,16 +78,11 @@ def information(fit: Fit, more: np.ndarray | float = 0.0, wider: float = 1.0) ->
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
     """(value, standard deviation) of a combination of parameters."""
-    _, parts, _ = COMBINATIONS[name]
-    keys = fit.keys
-    values = np.array([fit.values[key] for key in parts])
-    gradient = np.zeros(len(keys))
+    at, values = zip(*((fit.keys.index(key), fit.values[key]) for key in COMBINATIONS[name][1]))
     product = name == 'theta_B_C_N'
     value = float(np.prod(values) if product else np.sum(values))
-    for key, part in zip(parts, values):
-        i = keys.index(key)
-        gradient[i] = fit.scale[i] * (value / part if product else 1.0)
-    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs @ gradient)))
+    gradient = fit.scale[list(at)] * (value / np.array(values) if product else 1.0)
+    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs[np.ix_(at, at)] @ gradient)))
 
 
 def _places(fit: Fit, wheel: str) -> np.ndarray:

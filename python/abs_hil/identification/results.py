@@ -36,37 +36,28 @@ _LEFT_OUT = ('gate.brake_duty_max', 'gate.motor_duty_max')
 _OF_THE_START = ('mu_w2', 'lever_L_m', 'lever_phi_deg')
 
 
-def row(estimate: Estimate) -> dict[str, Any]:
-    return {'value': estimate.value, 'low': estimate.low, 'high': estimate.high, 'status': estimate.status}
+def _json(found: Identified | SpeedsFound, parameters: Mapping[str, Estimate], form: str, **more: Any) -> dict[str, Any]:
+    rows = {name: {'value': e.value, 'low': e.low, 'high': e.high, 'status': e.status} for name, e in parameters.items()}
+    return {'parameters': rows, 'form': form, 'start': found.start, **more, 'misfit': found.misfit or None, 'notes': found.notes,
+            'version': _core.version, 'date': datetime.date.today().isoformat()}
 
 
 def as_json(found: Identified) -> dict[str, Any]:
-    parameters = {name: e for name, e in {**found.parameters, **found.combinations}.items()
-                  if not found.refused or e.status == 'fixed'}
-    return {'parameters': {name: row(e) for name, e in parameters.items()},
-            'residual_counts_rms': found.residual_counts_rms,
-            'form': 'undecided' if found.undecided else found.form,
-            'start': found.start,
-            'disturbances': None if found.disturbances is None else {
-                'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
-            'logs': [{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
-                      'duration_s': float(log.time_s[-1] - log.time_s[0]),
-                      'disagreement': found.disagreement.get(log.name)} for log in found.logs],
-            'misfit': found.misfit or None,
-            'notes': found.notes,
-            'validation': found.validation,
-            'version': _core.version,
-            'date': datetime.date.today().isoformat()}
+    told = {name: e for name, e in {**found.parameters, **found.combinations}.items() if not found.refused or e.status == 'fixed'}
+    return _json(found, told, 'undecided' if found.undecided else found.form,
+                 residual_counts_rms=found.residual_counts_rms, validation=found.validation,
+                 disturbances=None if found.disturbances is None else {
+                     'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
+                 logs=[{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
+                        'duration_s': float(log.time_s[-1] - log.time_s[0]),
+                        'disagreement': found.disagreement.get(log.name)} for log in found.logs])
 
 
 def speeds_as_json(found: SpeedsFound) -> dict[str, Any]:
-    return {'parameters': {} if found.misfit else {name: row(e) for name, e in found.parameters.items()},
-            'form': found.form.name, 'start': found.start,
-            'traces': [{'name': trace.name, 'path': str(trace.path), 'sha256': trace.sha256, 'readings': trace.keys,
-                        'left': [{'channel': kind, 'rms': rms, 'unit': unit} for name, kind, rms, unit in found.left
-                                 if name == trace.name]} for trace in found.traces],
-            'misfit': found.misfit or None, 'notes': found.notes, 'version': _core.version,
-            'date': datetime.date.today().isoformat()}
+    return _json(found, {} if found.misfit else found.parameters, found.form.name, traces=[
+        {'name': trace.name, 'path': str(trace.path), 'sha256': trace.sha256, 'readings': trace.keys,
+         'left': [{'channel': kind, 'rms': rms, 'unit': unit} for name, kind, rms, unit in found.left if name == trace.name]}
+        for trace in found.traces])
 
 
 def speeds_as_toml(found: SpeedsFound) -> str:

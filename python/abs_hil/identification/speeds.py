@@ -44,8 +44,9 @@ HARDLY_WORSE = 1.2
 EDGE_S = 0.02
 #: the fastest lag
 FASTEST_PER_S = 900.0
-STARTS = [(dead_s, lag_s, friction) for dead_s in (0.004, 0.012, 0.02) for lag_s in (0.002, 0.03) for friction in (1.0, 0.5)]
 FRICTION, FULL, LAG = 'friction_over_start', 'brake_torque_at_{:g}_Nm', 'c31_per_s'
+STARTS = [{DEAD_TIME.key: dead_s, LAG: rate_per_s, FRICTION: friction}
+          for dead_s in (0.004, 0.012, 0.02) for rate_per_s in (500.0, 33.0) for friction in (1.0, 0.5)]
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,14 @@ class SpeedsFound:
 
 
 class Model:
-    """Readings of all traces for numbers x, one for each of `free`; the first ones, `shared`, are of the rig."""
+    """Readings of all traces, by `channels` with their trace's number, for numbers x, one for each of `free`; the first ones,
+    `shared`, are of the rig."""
 
-    def __init__(self, traces: Sequence[Trace], start: PathLike, fix: Mapping[str, float | None]) -> None:
+    def __init__(self, traces: Sequence[Trace], start: PathLike, fix: Mapping[str, float | None],
+                 check: Callable[[], None]) -> None:
         given = _core.PlantOptions(options(plant=start)).values()
-        self.traces, self.start = list(traces), str(start)
+        self.traces, self.start, self.check = list(traces), str(start), check
+        self.channels = [(number, one) for number, trace in enumerate(traces) for one in trace.channels]
         self.form = next(one for one in ALL_FORMS if one.settings == {f'plant.{key}': given[key] for key in ('tyre', 'load')})
         self.base = base_options(self.form, start)
         self.given = {key: float(given[key]) for key in ('J2_kg_m2', 'r2_m', *(p.key for p in self.form.parameters))}
@@ -138,11 +142,11 @@ class Model:
         return ({key: values[key] for key in told if key in values} | {FRICTION: named.get(FRICTION, 1.0)}
                 | {FULL.format(duty): values['b1_Nm'] * duty + values['b2_Nm'] for duty in self.duties})
 
-    def left(self, x: np.ndarray) -> list[list[np.ndarray]]:
-        """Readings less simulated ones, of each trace and channel."""
+    def left(self, x: np.ndarray) -> list[np.ndarray]:
+        """Readings less simulated ones, of each channel."""
         plant = self.plant_values(x)
-        return [self._left(trace, plant, {one.key: one.value(at) for one, at in zip(self.free, x) if one.trace == number})
-                for number, trace in enumerate(self.traces)]
+        return [left for number, trace in enumerate(self.traces) for left in self._left(
+            trace, plant, {one.key: one.value(at) for one, at in zip(self.free, x) if one.trace == number})]
 
     def _left(self, trace: Trace, plant: Mapping[str, float], own: Mapping[str, float]) -> list[np.ndarray]:
         keys, radii, changes = trace.keys, self.radii, trace.duty_time_s.copy()
@@ -177,25 +181,24 @@ class Model:
         return out
 
 
-def _least(model: Model, x0: np.ndarray, sizes: Sequence[Sequence[float]], most: int, check: Callable[[], None],
-           held: str = '', without: tuple[int, float, float] = (-1, 0.0, 0.0)) -> tuple[np.ndarray, float]:
+def _least(model: Model, x0: np.ndarray, sizes: Sequence[float], most: int, held: str = '',
+           without: tuple[int, float, float] = (-1, 0.0, 0.0)) -> tuple[np.ndarray, float]:
     """The least sum of soft squares from x0: (x, its half). held: key that stays; without: a trace and the stretch that is left
     out of it."""
     import scipy.optimize
     moves = np.array([one.key != held for one in model.free])
     low, high = (np.array([one.to_x(getattr(one, edge)) for one in model.free])[moves] for edge in ('least', 'most'))
     number, begin, end = without
-    channels = [(i, one, size) for i, trace in enumerate(model.traces) for one, size in zip(trace.channels, sizes[i])]
-    kept = np.concatenate([~((i == number) & (one.time_s >= begin) & (one.time_s < end)) for i, one, _ in channels])
-    scale = np.concatenate([np.full(len(one.value), size) for _, one, size in channels])
+    kept = np.concatenate([~((i == number) & (one.time_s >= begin) & (one.time_s < end)) for i, one in model.channels])
+    scale = np.repeat(sizes, [len(one.value) for _, one in model.channels])
     knees = [(i, one.to_x(one.first)) for i, one in enumerate(model.free) if one.key == model.knee]
     x = x0.copy()
 
     def residual(part: np.ndarray) -> np.ndarray:
-        check()
+        model.check()
         x[moves] = part
         try:
-            left = np.concatenate([one for its in model.left(x) for one in its])
+            left = np.concatenate(model.left(x))
         except ValueError:  # this friction would wedge the lever
             left = 100.0 * scale
         return np.append((left / scale)[kept], [x[i] - to for i, to in knees])
@@ -216,23 +219,20 @@ def identify_speeds(traces: Sequence[Trace], start: PathLike = 'inteco-manual', 
     Raises ValueError for unknown keys, and for traces in which no brake acts."""
     fix = dict(fix or {})
     checked_keys({key: value for key, value in fix.items() if key != DEAD_TIME.key}, start)
-    model = Model(traces, start, fix)
+    model = Model(traces, start, fix, check)
     say(f'{model.form.meaning}: {len(STARTS)} starts')
-    spans = [[max(float(np.ptp(one.value)) / 10.0, one.resolution) for one in trace.channels] for trace in traces]
-    begun = []
-    for dead_s, lag_s, friction in STARTS:
-        first = {DEAD_TIME.key: dead_s, LAG: 1.0 / lag_s, FRICTION: friction}
-        begun.append(_least(model, np.array([one.to_x(first.get(one.key, one.first)) for one in model.free]), spans, 8, check))
-    begun.sort(key=lambda one: one[1])
+    spans = [max(float(np.ptp(one.value)) / 10.0, one.resolution) for _, one in model.channels]
+    begun = sorted((_least(model, np.array([one.to_x(first.get(one.key, one.first)) for one in model.free]), spans, 8)
+                    for first in STARTS), key=lambda one: one[1])
     say('fit')
-    x, _ = min((_least(model, one, spans, 40, check) for one, _ in begun[:3]), key=lambda one: one[1])
+    x, _ = min((_least(model, one, spans, 40) for one, _ in begun[:3]), key=lambda one: one[1])
     for _ in range(2):
-        sizes = [[float(np.hypot(one.resolution / np.sqrt(12.0), 1.4826 * np.median(np.abs(left)))) + 1e-9
-                  for one, left in zip(trace.channels, its)] for trace, its in zip(traces, model.left(x))]
-        x, cost = _least(model, x, sizes, 40, check)
+        sizes = [float(np.hypot(one.resolution / np.sqrt(12.0), 1.4826 * np.median(np.abs(left)))) + 1e-9
+                 for (_, one), left in zip(model.channels, model.left(x))]
+        x, cost = _least(model, x, sizes, 40)
     say('intervals')
     shared, keys = len(model.shared), [one.key for one in model.free]
-    estimates = np.array([_least(model, x, sizes, 10, check, without=stretch)[0][:shared] for stretch in _stretches(traces)])
+    estimates = np.array([_least(model, x, sizes, 10, without=stretch)[0][:shared] for stretch in _stretches(traces)])
     groups = len(estimates)
     covariance = (groups - 1)**2 / groups * np.cov(estimates.T, ddof=1).reshape(shared, shared)
     found, moves = x, []
@@ -240,7 +240,7 @@ def identify_speeds(traces: Sequence[Trace], start: PathLike = 'inteco-manual', 
         if key in keys:
             held = x.copy()
             held[keys.index(key)] = model.free[keys.index(key)].to_x(value)
-            other, worse = _least(model, held, sizes, 20, check, key)
+            other, worse = _least(model, held, sizes, 20, key)
             if worse < HARDLY_WORSE * cost:
                 moves.append(other[:shared] - x[:shared])
                 found = other if key == LAG else found
@@ -289,14 +289,13 @@ def _assembled(model: Model, x: np.ndarray, covariance: np.ndarray, groups: int,
             for key in keys:
                 found.parameters[key].withdraw()
     worst = LARGEST_LEFT
-    for trace, its in zip(model.traces, model.left(x)):
-        for one, left in zip(trace.channels, its):
-            rms, spread = float(np.sqrt(np.mean(left**2))), float(np.std(one.value))
-            found.left.append((trace.name, one.kind, rms, '1' if one.kind == 'slip' else 'm/s' if one.at_rim else 'rad/s'))
-            if rms > worst * spread:
-                worst = rms / max(spread, 1e-300)
-                found.misfit = (f'the fit did not get there: it leaves {rms:.3g} RMS of {trace.name}, {one.kind}, whose readings '
-                                f'spread by {spread:.3g}. Does --reading say how they were read, and when the brake began?')
+    for (number, one), left in zip(model.channels, model.left(x)):
+        name, rms, spread = model.traces[number].name, float(np.sqrt(np.mean(left**2))), float(np.std(one.value))
+        found.left.append((name, one.kind, rms, '1' if one.kind == 'slip' else 'm/s' if one.at_rim else 'rad/s'))
+        if rms > worst * spread:
+            worst = rms / max(spread, 1e-300)
+            found.misfit = (f'the fit did not get there: it leaves {rms:.3g} RMS of {name}, {one.kind}, whose readings spread by '
+                            f'{spread:.3g}. Does --reading say how they were read, and when the brake began?')
     if found.misfit:
         found.parameters = {key: e for key, e in found.parameters.items() if e.status == 'fixed'}
     return found

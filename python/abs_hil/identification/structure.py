@@ -130,37 +130,26 @@ class Found:
 def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
     """Each cause that the problem has no parameter for, alone, surest first. Linearises a copy of the fit."""
     wide, shown = _widened(fit)
-    free, equations, bases = np.flatnonzero(wide.free), [], []
-    for share in SHARES:
+    free, systems = np.flatnonzero(wide.free), []
+    for share in SHARES[::-1]:  # _foretold needs the normal equations that the last one leaves
         cost, filtered = run_filter(wide, disturbances.times(share))
         N, n = keep_normals(wide, filtered)
         precision, towards = wide.prior()
-        equations.append((N + np.diag(precision), n + towards))
-        bases.append(cost)
-        if share == SHARES[0]:
-            normals, rights, costs = wide.normal, wide.right, wide.cost
+        systems.append((share, cost, (N + np.diag(precision), n + towards)))
         shown = [(cause, at[np.diag(N)[at] > 0.0]) for cause, at in shown]  # by these logs
-    shown = [(cause, at) for cause, at in shown if at.size]
-    more = [base - min(bases) for base in bases]
 
-    def gain(at: np.ndarray, beside: np.ndarray, costs: Sequence[float]) -> tuple[float, float, float]:
-        return max((gain - cost, x, share) for one, share, cost in zip(equations, SHARES, costs)
-                   for x, gain in (_gain(*one, beside, at),))
-
-    def found(cause: Cause, at: np.ndarray, beside: np.ndarray, costs: Sequence[float]) -> Found:
-        taken, x, share = gain(at, beside, costs)
-        return Found(cause, x * (wide.scale[at[0]] if cause.flaw else 1.0), float(np.sqrt(max(taken, 0.0))), share,
-                     moves=_moves(*equations[0], free, at))
-    of = [(found(cause, at, free, more), at) for cause, at in shown]
-    of.sort(key=lambda one: -one[0].sure)
+    def found(cause: Cause, at: np.ndarray, beside: np.ndarray = free[:0]) -> Found:
+        costs = [cost - (_gain(*one, free, beside)[1] if beside.size else 0.0) for _, cost, one in systems]
+        taken, x, share = max((gain - cost, x, share) for (share, _, one), cost in zip(systems, costs)
+                              for x, gain in (_gain(*one, np.append(free, beside), at),))
+        return Found(cause, x * (wide.scale[at[0]] if cause.flaw else 1.0), float(np.sqrt(max(taken + min(costs), 0.0))), share,
+                     moves=_moves(*systems[-1][2], free, at))
+    of = sorted(((found(cause, at), at) for cause, at in shown if at.size), key=lambda one: -one[0].sure)
     for surest, at in of[:1]:
-        with_it = [cost - _gain(*one, free, at)[1] for one, cost in zip(equations, more)]
-        beside, more_then = np.append(free, at), [cost - min(with_it) for cost in with_it]
-        surest.beside = max((found(one.cause, other, beside, more_then) for one, other in of[1:]), key=lambda one: one.sure,
-                            default=None)
+        surest.beside = max((found(one.cause, other, at) for one, other in of[1:]), key=lambda one: one.sure, default=None)
         every = np.concatenate([other for _, other in of])
-        surest.together = max(_together(*one, free, every) - cost for one, cost in zip(equations, more))
-        wide.normal, wide.right, wide.cost = normals, rights, costs
+        least = min(cost for _, cost, _ in systems)
+        surest.together = max(_together(*one, free, every) - cost + least for _, cost, one in systems)
         surest.foretold = _foretold(wide, at)
     return [one for one, _ in of]
 
