@@ -16,11 +16,8 @@ from .problem import Fit
 SURE_DELAY = 6.0
 SURE = 4.0
 LARGEST_DELAY_S = 0.02
-#: a difference of -2 log likelihood that decides between the forms, and one that does so above the level that compares them
+#: a difference of -2 log likelihood that decides between the forms
 CLEAR_DIFFERENCE = 500.0
-CLEAR_AT_FIRST = 5000.0
-#: no form that rests is given up at larger disturbances: they hide what it lacks
-FIRST_COMPARED = 0.01
 #: of boards with PWMs of 8, 10 and 12 bit
 PWM_STEPS = (255, 1023, 4095)
 #: a limit is believed if it lowers -2 log likelihood by this
@@ -34,38 +31,37 @@ WORTH_A_LOOK = 3.0
 
 
 def better_form(fits: Sequence[Fit], start_form: str, notes: list[str]) -> tuple[list[Fit], bool]:
-    """Takes all forms down to COMPARED side by side, or to where none can follow the logs. Those that are left, first the one that
-    better predicts each log from all the others, by the likelihood. One is given up that cannot follow the logs, or is clearly
-    worse, while another may. False: the logs do not tell, and the form is the start's."""
-    left, costs, levels = list(fits), [np.inf], LEVELS[1:LEVELS.index(COMPARED) + 1]
+    """Takes all forms down to COMPARED side by side, or to where none can follow the logs. First the one that better predicts each
+    log from all the others, by the likelihood. One that cannot follow the logs waits behind all while another may. False: the logs
+    do not tell, and the form is the start's."""
+    left, waiting, levels = [(np.inf, fit) for fit in fits], list[Fit](), LEVELS[1:LEVELS.index(COMPARED) + 1]
     while levels:
         now = levels if len(left) == 1 else levels[:1]
         levels = levels[len(now):]
-        tried = [(cost, rests, fit) for fit in left for rests, cost in (_lowered(fit, now),)]
-        may = [fit for _, rests, fit in tried if fit.may_follow and rests]
-        best = min(cost for cost, _, _ in tried)
-        kept = [(cost, fit) for cost, rests, fit in tried if not may or fit in may or (
-            fit.may_follow or now[-1] > FIRST_COMPARED and not rests) and cost < best + CLEAR_AT_FIRST]
-        costs, left = map(list, zip(*sorted(kept, key=lambda one: one[0])))
-        if not any(fit.may_follow for fit in left):
+        tried = sorted(((_lowered(fit, now), fit) for _, fit in left), key=lambda one: one[0])
+        left = [one for one in tried if one[1].may_follow]
+        if not left:
+            left = tried
             break
-    for fit, cost in zip(left, costs):
+        waiting += [fit for _, fit in tried if not fit.may_follow]
+    for cost, fit in left:
         fit.problem.say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
-    if len(left) > 1 and costs[-1] - costs[0] <= CLEAR_DIFFERENCE:
-        return sorted(left, key=lambda fit: fit.problem.form.name != start_form), False
+    if len(left) > 1 and left[-1][0] - left[0][0] <= CLEAR_DIFFERENCE:
+        return sorted((fit for _, fit in left), key=lambda fit: fit.problem.form.name != start_form), False
     if len(fits) > 1:
         why = 'it predicts left-out logs better' if len(left) > 1 else 'it alone may follow the logs to the steps of the counts'
-        notes.append(f'form: {left[0].problem.form.meaning}; {why}')
-    return left, True
+        notes.append(f'form: {left[0][1].problem.form.meaning}; {why}')
+    return [fit for _, fit in left] + waiting, True
 
 
-def _lowered(fit: Fit, levels: Sequence[float]) -> tuple[bool, float]:
-    """Whether the form rests at the last of these levels, and its cost: infinite where it leads to a plant that cannot be."""
+def _lowered(fit: Fit, levels: Sequence[float]) -> float:
+    """The form's cost at the last of these levels: infinite where it leads to a plant that cannot be."""
     try:
-        return descend(fit, levels), left_out_cost(fit)
+        descend(fit, levels)
+        return left_out_cost(fit)
     except (ValueError, np.linalg.LinAlgError):
         fit.least_rms = np.inf
-        return False, np.inf
+        return np.inf
 
 
 def with_steps(fit: Fit) -> Iterator[Fit]:

@@ -97,8 +97,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
             notes.append(f'{tried.meaning}: cannot be fitted ({error})')
     if not begun:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
-    # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
-    fits, decided = choices.better_form([choices.sought(one) for one in begun], start_form, notes)
+    fits, decided = choices.better_form(begun, start_form, notes)
     try:
         finished = _likelier(fits, seed)
     except KeyboardInterrupt:
@@ -189,6 +188,8 @@ def _explained(fit: Fit, seed: int) -> Finished:
     limited = choices.sought(fit)
     fit = fit if limited is fit else disturbed_fit(limited)
     while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
+        if (quiet := _quiet(found[0].without([RATE_LIMIT.key]))) is not None:
+            return _settled(quiet, seed)
         fit = disturbed_fit(found[0])
     causes = found[1]
     if first_causes and any(one.cause is first_causes[0].cause for one in causes):

@@ -24,7 +24,7 @@ from .linear import CONVERGED, MOST_HALVINGS, disc_waves_rad, filtered, measure,
 from .logs import motion_of
 from .parameters import DELAY, FLAWS, RATE_LIMIT
 from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
-from .start import first_values
+from .start import WORTH_DEAD, first_values
 
 #: standard deviations of the homotopy's levels, from that of the first values down
 LEVELS = (0.1, 0.032, 0.01, 3.2e-3, 1e-3, 3.2e-4, 1e-4, 3.2e-5, 1e-5)
@@ -131,6 +131,8 @@ def start_fit(problem: Problem, start: Mapping[str, float], other_form: Fit | No
         known = other_form.first
         return _started(dataclasses.replace(problem, motions=other_form.problem.motions), start, known, known)
     fit = _started(problem, start, {})
+    if not fit.may_follow and (late := _started(problem, start, {}, worth_dead=0.0)).least_rms < fit.least_rms:
+        fit = late
     discs = {p.key: fit.values[p.key] for p in problem.parameters if p.acts == 'reading'}
     if all(abs(value) < SMALL_DISC_RAD for value in discs.values()):
         return fit
@@ -144,8 +146,8 @@ def start_fit(problem: Problem, start: Mapping[str, float], other_form: Fit | No
 
 
 def _started(problem: Problem, start: Mapping[str, float], discs: Mapping[str, float],
-             other_form: Mapping[str, float] | None = None) -> Fit:
-    first = first_values(problem, start, other_form)
+             other_form: Mapping[str, float] | None = None, worth_dead: float = WORTH_DEAD) -> Fit:
+    first = first_values(problem, start, other_form, worth_dead)
     problem = dataclasses.replace(problem, flaws=tuple(flaw.key for flaw in FLAWS if flaw.key in first))
     values = {DELAY: 0.0, RATE_LIMIT.key: problem.fixed.get(RATE_LIMIT.key, 0.0), **first, **dict.fromkeys(problem.factors, 1.0),
               **{p.key: discs.get(p.key, 0.0) for p in problem.parameters if p.acts == 'reading'}}
@@ -159,31 +161,30 @@ def level(sd: float) -> Disturbances:
     return Disturbances.of(sd, 0.3 * sd, 0.2 if sd > 0.03 else 0.5)
 
 
-def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float) -> bool:
-    """Steps until one goes less far than `rests`, at most so many. False if none does, or if no further one will bring the fit
-    below the bound of its residual: where the gain of one falls below GAINLESS of what is missing."""
+def rest(fit: Fit, disturbances: Disturbances, most: int, rests: float) -> None:
+    """Steps until one goes less far than `rests`, at most so many, or until no further one will bring the fit below the bound of
+    its residual: where the gain of one falls below GAINLESS of what is missing."""
     stuck, before = 0, np.inf
     for number in range(most):
         # What the logs hardly tell moves on without end: the longer it lasts, the larger a step may be the last.
-        if step(fit, disturbances) < min(max(rests, 0.05 * number), RESTS):
-            return True
+        moved, square = step(fit, disturbances), fit.least_rms**2
         stuck += fit.halvings >= MOST_HALVINGS
-        square = fit.least_rms**2
-        if stuck == 2 or before - square < GAINLESS * (square - fit.bound_rms**2):
+        if moved < min(max(rests, 0.05 * number), RESTS) or stuck == 2 or (
+                not fit.may_follow and before - square < GAINLESS * (square - fit.bound_rms**2)):
             break
         before = square
-    return False
 
 
-def descend(fit: Fit, levels: Sequence[float]) -> bool:
+def descend(fit: Fit, levels: Sequence[float]) -> None:
     """Lowers the disturbances level by level, and waits at each until the fit rests; goes no lower than where it shows that it
-    cannot follow the logs. False if it does not rest at the last one. Where a level's last step hardly moved, the steps converge
-    quadratically: then the next levels are left out, more each time."""
-    rests, at, stride = False, 0, 1
+    cannot follow the logs. Where a level's last step hardly moved, the steps converge quadratically: then the next levels are
+    left out, more each time."""
+    at, stride = 0, 1
     while at < len(levels):
         present = level(levels[at])
         for number in range(3):
-            rests, u0 = rest(fit, present, MOST_AT_A_LEVEL, RESTS), fit.values['u0']
+            rest(fit, present, MOST_AT_A_LEVEL, RESTS)
+            u0 = fit.values['u0']
             if number == 0 and levels[at] > COMPARED:
                 search_u0(fit, 0.004, 9)
             search_u0(fit, 0.0, 6)
@@ -191,9 +192,8 @@ def descend(fit: Fit, levels: Sequence[float]) -> bool:
                 break
         if not fit.may_follow:
             break
-        stride = 2 * stride if rests and fit.last_step < CONVERGED else 1
+        stride = 2 * stride if fit.last_step < CONVERGED else 1
         at += stride
-    return rests
 
 
 def finish_fit(fit: Fit) -> Fit:

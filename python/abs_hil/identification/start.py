@@ -75,9 +75,11 @@ def _pieces(problem: Problem) -> _Pieces:
     return _Pieces(parts, *(np.concatenate(column) for column in zip(*columns)))
 
 
-def first_values(problem: Problem, start: Mapping[str, float], other_form: Mapping[str, float] | None = None) -> dict[str, float]:
-    """First values of the form's parameters, and of the brake's dead time where the logs show one. `start` fills what they do not
-    tell; `other_form`: first values of another form, from the same logs: all but the tyre's hold here, too."""
+def first_values(problem: Problem, start: Mapping[str, float], other_form: Mapping[str, float] | None = None,
+                 worth_dead: float = WORTH_DEAD) -> dict[str, float]:
+    """First values of the form's parameters, and of the brake's dead time if it takes the share `worth_dead` off the cost. `start`
+    fills what the logs do not tell; `other_form`: first values of another form, from the same logs: all but the tyre's hold
+    here, too."""
     pieces = _pieces(problem)
     value = {p.key: float(start[p.key]) for p in problem.form.parameters} | problem.fixed
     if other_form is None:
@@ -87,7 +89,7 @@ def first_values(problem: Problem, start: Mapping[str, float], other_form: Mappi
             if rolling.sum() > 3 and 'r1_m' not in problem.fixed:
                 value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
-        value.update(_scanned_brake(value, pieces, problem))
+        value.update(_scanned_brake(value, pieces, problem, worth_dead))
         value.update({p.key: float(np.clip(value[p.key], p.least, p.most)) for p in problem.form.parameters} | problem.fixed)
     else:
         value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
@@ -114,7 +116,7 @@ _Scanned = tuple[float, np.ndarray, float, float, float]
 _FLOORS = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
 
 
-def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem) -> dict[str, float]:
+def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem, worth_dead: float) -> dict[str, float]:
     """Bearings, motor and brake: the linear ones at the likeliest u0, c31 and dead time."""
     logs, fixed = problem.logs, problem.fixed
     r1, r2, J2 = value['r1_m'], problem.given['r2_m'], problem.given['J2_kg_m2']
@@ -196,7 +198,7 @@ def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem
         for width, factor in ((span, 1.25), (span / 4, 1.08)):
             best = scan(best, near(best[2], width), best[3] * np.geomspace(1.0 / factor, factor, 5))
         late = scan(best, [best[2]], np.geomspace(8.0, 600.0, 8), np.arange(COARSE_S, LARGEST_DEAD_S, COARSE_S))
-        if late[0] < (1.0 - WORTH_DEAD) * best[0]:
+        if late[0] < (1.0 - worth_dead) * best[0]:
             best = scan(late, near(late[2], span), late[3] * np.geomspace(0.7, 1.4, 5), late[4] + COARSE_S * np.arange(-1, 2))
     linear = dict(zip(_LINEAR, best[1].tolist()))
     found = {key: linear[key] for key in _LINEAR if key in value}
