@@ -42,9 +42,9 @@ NAMES = 'the logs do not fit this plant'
 def asked(log, settings, random, steps):
     """The log with the duties that somebody asked for and a board of so many steps gave; the counts are those of the board's."""
     duty = np.clip(log.brake_pwm + (log.brake_pwm > 0.0) * random.uniform(-0.4, 0.4, len(log)) / steps, 0.0, 1.0)
-    given = np.floor(duty * steps + 0.5) / steps
+    given = {'brake_pwm': duty, 'motor_pwm': log.motor_pwm}
     base = _core.PlantOptions(options(set=settings))
-    inputs = {**log.inputs(), 'brake_pwm': given}
+    inputs = {**log.inputs(), **{name: np.floor(asked_for * steps + 0.5) / steps for name, asked_for in given.items()}}
     counts = _core.encoder_counts(base, _core.trajectory(base, [], inputs, np.zeros(5))[:, :2]).astype(float)
     return dataclasses.replace(log, brake_pwm=duty, counts=counts - counts[0], first_counts=counts[0])
 

@@ -64,25 +64,17 @@ def _lowered(fit: Fit, levels: Sequence[float]) -> float:
         return np.inf
 
 
-def with_steps(fit: Fit) -> Iterator[Fit]:
-    """The fit to duties as a board would have given them, which the logs hold as they were asked for, where that is likelier. To
-    be believed only if nothing but the counts' steps is left then: on a rig that the plant does not describe, any other duties
-    may be likelier."""
+def with_steps(fit: Fit) -> Iterator[tuple[float, Fit]]:
+    """The fit to duties as boards would have given them, which the logs hold as they were asked for, each with the level of
+    disturbances that would take up what a step is: one that cannot follow there has other reasons. To be believed only if nothing
+    but the counts' steps is left then: on a rig that the plant does not describe, any other duties may be likelier."""
     duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
-    others = []
     for steps in PWM_STEPS[::-1]:
         if np.abs(duties * steps - np.rint(duties * steps)).max() >= 1e-5:
             # A half rounds up, as on the board, whatever the last digit of the log's.
             logs = [dataclasses.replace(log, **{name: np.floor(getattr(log, name) * steps + 0.5 + 1e-6) / steps
                                                 for name in ('brake_pwm', 'motor_pwm')}) for log in fit.problem.logs]
-            others.append((dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps), fit.values))
-    if not others:
-        return
-    present, *costs = other_costs(fit, [True] * len(fit.pieces), [(fit.problem, fit.values), *others])
-    for cost, (problem, _) in sorted(zip(costs, others), key=lambda one: one[0]):
-        if cost < present - CLEAR_GAIN:
-            problem.say(f'duties of {problem.pwm_steps} steps')
-            yield fit.copy(problem=problem)
+            yield 0.5 / steps, fit.copy(problem=dataclasses.replace(fit.problem, logs=logs, pwm_steps=steps))
 
 
 def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:

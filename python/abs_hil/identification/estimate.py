@@ -157,9 +157,13 @@ def _likelier(fits: Sequence[Fit], seed: int) -> Finished:
 def _quiet(fit: Fit) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
     board gives them; with late inputs and a limit of the brake's rate where the logs show them."""
-    for tried in itertools.chain([fit], choices.with_steps(fit)):
+    stopped = 0.0
+    for takes_up, tried in itertools.chain([(np.inf, fit)], choices.with_steps(fit)):
+        if stopped > takes_up:
+            continue
         try:
             found = finish_fit(tried.copy()) if tried is not fit or fit.may_follow else fit
+            stopped = stopped or float(found.disturbances.sd[0])
             for remedy in (choices.with_delay, choices.sought):
                 if (more := remedy(found)) is not found and finish_fit(more).follows:
                     found = more
