@@ -236,7 +236,7 @@ def page(o):
 
 
 #: largest median error of an undisturbed rig's parameter, relative
-LARGEST_ERROR = {'M10_Nm': 3e-3, 'lever_Mg_Nm': 3e-3, 'mu_w4': 3e-3, 'mu_a': 3e-3}
+LARGEST_ERROR = {'M10_Nm': 3e-3, **dict.fromkeys(('lever_Mg_Nm', 'mu_w4', 'mu_a', 'mu_w1', 'mu_w3'), 3e-3)}
 LARGEST_ERROR_ELSE = 5e-4
 
 

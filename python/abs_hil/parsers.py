@@ -11,6 +11,20 @@ PICTURES, EXPORTS = ('pdf', 'png', 'svg'), ('csv', 'json', 'octave', 'parquet')
 #: what varies from episode to episode by default, as `abs_hil compare --vary`
 VARY = 'parameters=0.1,theta=0.1,phase'
 PORT, FOXGLOVE_PORT = 8265, 8765
+_INF = float('inf')
+#: what --reading may tell of a trace's readings: key -> unit, range, meaning
+READINGS = {
+    'from_s': ('s', -_INF, _INF, 'first time that is used: both wheels roll on each other [the first row]'),
+    'to_s': ('s', -_INF, _INF, 'last time that is used [the last row]'),
+    'window_s': ('s', 0.0, 0.2, 'a reading is the mean over so long [0]'),
+    'speed_age_s': ('s', 0.0, 0.2, 'the window of a speed ended so long before its time [0]'),
+    'slip_age_s': ('s', 0.0, 0.2, 'the window of a slip ended so long before its time [0]'),
+    'speed_resolution': ("of the file's speeds", 0.0, _INF, 'a speed is given in steps of this [the least step]'),
+    'slip_resolution': ('1', 0.0, 1.0, 'a slip is given in steps of this [the least step]'),
+    'relay_below': ('1', 0.0, 1.0, "the brake's duty was 1 while the slip as read was below this, else 0"),
+    'brake_duty': ('1', 0.0, 1.0, "the brake's duty from brake_from_s on"),
+    'brake_from_s': ('s', -_INF, _INF, 'the brake began about then: the instant is fitted, within 0.02 s'),
+}
 Parser = Callable[[], argparse.ArgumentParser]
 #: endings of all files that programs of this project write or read
 _FORMATS = ('.csv', '.json', '.html', '.lcmlog', '.mcap', '.parquet', '.pdf', '.svg', '.png', '.md', '.toml', '.mat', '.fmu',
@@ -55,6 +69,21 @@ def to_write(*endings: str) -> Callable[[str], pathlib.Path]:
             raise argparse.ArgumentTypeError(f'"{text}": give ' + (' or '.join(f'FILE{one}' for one in endings) or 'a folder'))
         return pathlib.Path(text)
     return path
+
+
+def reading(text: str) -> tuple[str, float]:
+    """A type of argparse: KEY=VALUE of READINGS."""
+    key, _, number = text.partition('=')
+    if key not in READINGS:
+        raise argparse.ArgumentTypeError(f'{text}: no such key; give one of {", ".join(READINGS)}')
+    unit, least, most, what = READINGS[key]
+    try:
+        value = float(number)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text}: "{number}" is no number') from None
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f'{text}: give a number from {least:g} to {most:g} ({unit}): {what}')
+    return key, value
 
 
 def _port(text: str) -> int:
@@ -125,8 +154,14 @@ def learn(made: argparse.ArgumentParser) -> None:
 
 @_program('abs_identify', "Estimates the rig's parameters from its own logs and writes a model file (docs/identification.md)")
 def identify(made: argparse.ArgumentParser) -> None:
-    made.add_argument('logs', metavar='LOG', nargs='+', help='run folders, event logs, or CSV files with time_s, upper_counts, '
+    made.add_argument('logs', metavar='LOG', nargs='*', help='run folders, event logs, or CSV files with time_s, upper_counts, '
                       'lower_counts, brake_pwm, motor_pwm and, if there, phase and wheels_apart; gzip or not')
+    made.add_argument('--speeds', metavar='FILE', action='append', default=[], help='instead of logs, a CSV file of coarse wheel '
+                      'speeds: time_s and some of upper_rpm, lower_rpm (also _rad_s, _m_s), slip, brake_pwm, motor_pwm; may be '
+                      'repeated')
+    made.add_argument('--reading', metavar='KEY=VALUE', action='append', dest='speeds', type=reading, help='how the --speeds FILE '
+                      'before it was read, or, before the first one, all of them: '
+                      + '; '.join(f'{key}: {row[-1]}' for key, row in READINGS.items()))
     made.add_argument('--start', metavar='NAME|FILE', default='paper-table1',
                       help='plant with the given J2 and r2, and what the logs do not tell [paper-table1]')
     made.add_argument('--fix', metavar='KEY[=VALUE]', action='append', default=[],

@@ -18,8 +18,8 @@ from .messages import QUANTITIES
 
 #: columns that every run's CSV has, whatever version wrote it; others may follow in any order
 CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None and row['since'] == '0.1')
-#: columns that hold texts: of a run; of exported runs their name; of converted logs where a row came from
-TEXTS = ('phase', 'phase_name', 'run', 'channel', 'type')
+#: columns that hold texts: of a run; of exported runs their name; of converted logs where a row came from; of coarse traces
+TEXTS = ('phase', 'phase_name', 'run', 'channel', 'type', 'wheel')
 MOST_SHOWN = 40
 #: the latest time of a row: some other program's may count from 1970
 LAST_S = 2e9

@@ -1,8 +1,25 @@
 // The prediction-error filter of identification (python/abs_hil/identification): it weighs a log's counts with the
-// sensitivities of identification_sensitivities.cpp.
+// sensitivities of identification_sensitivities.cpp. It takes one step for each window, whatever the disturbances: with
+// the sums that identification_sums.cpp makes once for each linearisation.
 //
-// It takes one step for each window, whatever the disturbances: with the sums that identification_sums.cpp makes once
-// for each linearisation.
+// In changes from the states and parameters of the linearisation, for window w with the state x (angles, rad, speeds,
+// rad/s, brake torque, N m, and five random factors), the parameters' scaled changes p and the readings r, rad:
+//
+//     r = H x + D p + e,            e ~ N(0, q / weight),  q = (2 pi / counts)^2 / 12
+//     x' = F x + G p + gap + v,     v ~ N(0, noise)
+//
+// Noise drives only the factors: f' = k f + ..., k = exp(-duration / time constant).
+//
+// With A = H' H / q (weighted) and P = L L' the covariance of x before the readings, a Kalman filter's step is
+//
+//     M = I + L' A L,   P+ = L M^-1 L',   x+ = x + P+ H' (r - H x - D p) / q,   P' = F P+ F' + noise
+//
+// x is affine in p, x = x0 + X p, so each innovation is too, and with S the covariance of all readings
+//
+//     -2 log L(p) = s - 2 n'p + p'N p + log |S|,   N = sum D~' S^-1 D~,   n = sum D~' S^-1 r~
+//
+// come from one pass, D~ and r~ being the innovations' columns (Gauss-Markov; Kalman 1960; Schweppe 1965). The most
+// likely states follow backwards, without an inverse covariance (modified Bryson-Frazier: Bierman 1977).
 
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>

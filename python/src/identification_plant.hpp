@@ -51,24 +51,37 @@ inline PlantOptions with(const PlantOptions& options, const Values& values) {
 
 // ---- the inputs of a log
 
-/// What acted on the rig: row n's duties act from `time_s[n]`, later by `delay_s`, to the next row's.
+/// What acted on the rig: row n's duties act from `time_s[n]`, later by `delay_s`, to the next row's. Until then those
+/// of `brake_before` and `motor_before` act, or, without these, the duties of the row before.
 struct Inputs {
   explicit Inputs(const py::dict& log)
       : time_s(log["time_s"].cast<Array>()),
         brake_pwm(log["brake_pwm"].cast<Array>()),
         motor_pwm(log["motor_pwm"].cast<Array>()),
         wheels_apart(log["wheels_apart"].cast<Array>()) {
-    for (const Array* column : {&brake_pwm, &motor_pwm, &wheels_apart}) {
-      if (column->size() != time_s.size()) throw std::invalid_argument("the log's columns differ in length");
+    late = log.contains("brake_before");
+    if (late) {
+      brake_before = log["brake_before"].cast<Array>();
+      motor_before = log["motor_before"].cast<Array>();
+    }
+    for (const Array* column : {&brake_pwm, &motor_pwm, &wheels_apart, &brake_before, &motor_before}) {
+      if (column->size() != time_s.size() && (late || column->size() > 0))
+        throw std::invalid_argument("the log's columns differ in length");
     }
   }
   [[nodiscard]] std::ptrdiff_t rows() const { return time_s.size(); }
   [[nodiscard]] plant_sim::PlantInput at(std::ptrdiff_t row) const {
     return {.motor_duty = motor_pwm.data()[row], .brake_duty = brake_pwm.data()[row]};
   }
+  [[nodiscard]] plant_sim::PlantInput before(std::ptrdiff_t row) const {
+    if (!late) return at(row > 0 ? row - 1 : row);
+    return {.motor_duty = motor_before.data()[row], .brake_duty = brake_before.data()[row]};
+  }
   [[nodiscard]] bool apart(std::ptrdiff_t row) const { return wheels_apart.data()[row] != 0.0; }
 
   Array time_s, brake_pwm, motor_pwm, wheels_apart;
+  Array brake_before{}, motor_before{};
+  bool late{false};
 };
 
 /// A plant whose inputs come late.
@@ -87,10 +100,12 @@ struct DelayedPlant {
   /// From row to row + 1.
   void advance(const Inputs& inputs, std::ptrdiff_t row) {
     const double interval_s = inputs.time_s.data()[row + 1] - inputs.time_s.data()[row];
-    const double late_s = std::min(delay_s, interval_s);
+    const plant_sim::PlantInput now = inputs.at(row), before = inputs.before(row);
+    const bool same = before.motor_duty == now.motor_duty && before.brake_duty == now.brake_duty;
+    const double late_s = same ? 0.0 : std::min(delay_s, interval_s);
     plant.part_wheels(inputs.apart(row));
-    if (late_s > 0.0) plant.advance(late_s, inputs.at(row > 0 ? row - 1 : row));
-    if (interval_s > late_s) plant.advance(interval_s - late_s, inputs.at(row));
+    if (late_s > 0.0) plant.advance(late_s, before);
+    if (interval_s > late_s) plant.advance(interval_s - late_s, now);
   }
 
   double delay_s;

@@ -1,5 +1,16 @@
 // The plant's sensitivities over the windows of a log: differences of simulations, side by side in lanes where both
 // wheels turn, one after the other where one stands.
+//
+// With x(t; x0, p, u) the plant's motion from the window's start x0 (angles, rad, speeds, rad/s, brake torque, N m),
+// with parameters p under the duties u, and c the change of the fit that a step of a parameter is,
+//
+//     H   = [I2, (x(t; x0 + h e_j, p, u) - x(t; x0, p, u)) / h]   of both angles, by speeds and torque
+//     D_i = (x(t; x0, p + dp_i, u_i) - x(t; x0, p, u)) / c_i      of both angles
+//
+// with h = 1e-5 max(1, |x0_j|). F and G are those of all states at the window's end.
+//
+// The angles only add up. Where flaws of the brake turn its duties into others (brake_flaws.py), u_i are those that the
+// moved parameter asks for.
 
 #include <cmath>
 #include <cstring>
@@ -15,7 +26,6 @@ namespace abs_hil::python {
 
 namespace {
 
-using plant_sim::lanes::Interval;
 using plant_sim::lanes::WindowKernel;
 using plant_sim::lanes::WindowWork;
 
@@ -34,6 +44,7 @@ struct Varied {
   DelayedPlant plant;
   double step;
   Acts acts;
+  std::unique_ptr<Inputs> own;  // duties of its own, if there are any
 };
 
 struct Window {
@@ -73,7 +84,7 @@ class Lanes {
  public:
   virtual ~Lanes() = default;
   /// Simulates the window from `starts` (columns of plants, states). False where lanes cannot.
-  virtual bool pass(const Inputs& inputs, const Window& window,
+  virtual bool pass(const std::vector<const Inputs*>& inputs, const Window& window,
                     const std::vector<std::array<double, states>>& starts) = 0;
   [[nodiscard]] double angle(std::ptrdiff_t row, std::ptrdiff_t wheel, std::size_t column) const {
     return angles_[static_cast<std::size_t>(row * angles + wheel) * lanes_ + column];
@@ -112,10 +123,10 @@ class LanesOf : public Lanes {
     for (Plant& plant : plants_) pointers_.push_back(reinterpret_cast<double*>(&plant));
   }
 
-  bool pass(const Inputs& inputs, const Window& window,
+  bool pass(const std::vector<const Inputs*>& inputs, const Window& window,
             const std::vector<std::array<double, states>>& starts) override {
-    const bool apart = inputs.apart(window.first);
-    if (!take_inputs(inputs, window, apart)) return false;
+    const bool apart = inputs[0]->apart(window.first);
+    if (!take_durations(*inputs[0], window, apart)) return false;
     bool late = false;
     for (std::size_t i = 0; i < plants_.size(); ++i) {
       plant_sim::StateVector& x = plants_[i].x;
@@ -129,18 +140,19 @@ class LanesOf : public Lanes {
       if (plants_[i].upper_turns == 0.0) x[plant_sim::omega1] = 0.0;
       late = late || plants_[i].delay_s > 0.0;
     }
-    const std::size_t rows = intervals_.size();
+    const std::size_t rows = durations_s_.size();
     angles_.resize(static_cast<std::size_t>(angles) * rows * lanes_);
-    if (lanes_ == kernel_.lanes)
-      return kernel_.pass(
-          {pointers_.data(), pointers_.size(), intervals_.data(), rows, apart, late, angles_.data(), ends_.data()});
+    const bool whole = lanes_ == kernel_.lanes;  // one pass fills the arrays themselves
+    part_angles_.resize(whole ? 0 : static_cast<std::size_t>(angles) * rows * kernel_.lanes);
+    part_ends_.resize(whole ? 0 : static_cast<std::size_t>(states) * kernel_.lanes);
+    std::vector<double>&to_angles = whole ? angles_ : part_angles_, &to_ends = whole ? ends_ : part_ends_;
     for (std::size_t begin = 0; begin < plants_.size(); begin += kernel_.lanes) {
       const std::size_t count = std::min(kernel_.lanes, plants_.size() - begin);
-      part_angles_.resize(static_cast<std::size_t>(angles) * rows * kernel_.lanes);
-      part_ends_.resize(static_cast<std::size_t>(states) * kernel_.lanes);
-      if (!kernel_.pass({pointers_.data() + begin, count, intervals_.data(), rows, apart, late, part_angles_.data(),
-                         part_ends_.data()}))
+      take_duties(inputs, window, begin, count);
+      if (!kernel_.pass({pointers_.data() + begin, count, durations_s_.data(), duties_.data(), rows, apart, late,
+                         to_angles.data(), to_ends.data()}))
         return false;
+      if (whole) continue;
       copy(part_angles_, angles_, begin);
       copy(part_ends_, ends_, begin);
     }
@@ -183,16 +195,30 @@ class LanesOf : public Lanes {
     return window_kernel<rig::Portable, Kind>();
   }
   /// False if the wheels part or join within the window.
-  bool take_inputs(const Inputs& inputs, const Window& window, bool apart) {
-    intervals_.clear();
+  bool take_durations(const Inputs& inputs, const Window& window, bool apart) {
+    durations_s_.clear();
     for (std::ptrdiff_t row = window.first; row < window.last; ++row) {
       if (inputs.apart(row) != apart) return false;
-      const plant_sim::PlantInput now = inputs.at(row);
-      const plant_sim::PlantInput earlier = inputs.at(row > 0 ? row - 1 : row);
-      intervals_.push_back({inputs.time_s.data()[row + 1] - inputs.time_s.data()[row], now.motor_duty, now.brake_duty,
-                            earlier.motor_duty, earlier.brake_duty});
+      durations_s_.push_back(inputs.time_s.data()[row + 1] - inputs.time_s.data()[row]);
     }
     return true;
+  }
+  /// Of the plants from `begin` on; free lanes repeat the first of them.
+  void take_duties(const std::vector<const Inputs*>& inputs, const Window& window, std::size_t begin,
+                   std::size_t count) {
+    duties_.resize(durations_s_.size() * plant_sim::lanes::duties * kernel_.lanes);
+    double* to = duties_.data();
+    for (std::ptrdiff_t row = window.first; row < window.last; ++row) {
+      for (std::size_t lane = 0; lane < kernel_.lanes; ++lane, ++to) {
+        const Inputs& own = *inputs[begin + (lane < count ? lane : 0)];
+        const plant_sim::PlantInput now = own.at(row), earlier = own.before(row);
+        to[plant_sim::lanes::motor_duty * kernel_.lanes] = now.motor_duty;
+        to[plant_sim::lanes::brake_duty * kernel_.lanes] = now.brake_duty;
+        to[plant_sim::lanes::earlier_motor_duty * kernel_.lanes] = earlier.motor_duty;
+        to[plant_sim::lanes::earlier_brake_duty * kernel_.lanes] = earlier.brake_duty;
+      }
+      to += (plant_sim::lanes::duties - 1) * kernel_.lanes;
+    }
   }
   void copy(const std::vector<double>& from, std::vector<double>& to, std::size_t begin) const {
     for (std::size_t i = 0; i * kernel_.lanes < from.size(); ++i)
@@ -202,7 +228,7 @@ class LanesOf : public Lanes {
   std::vector<Plant> plants_;
   std::vector<double*> pointers_;
   WindowKernel kernel_;
-  std::vector<Interval> intervals_;
+  std::vector<double> durations_s_, duties_;
   std::vector<double> part_angles_, part_ends_;
 };
 
@@ -272,13 +298,15 @@ class Lineariser {
  public:
   Lineariser(const PlantOptions& base, const Values& nominal, const py::list& parameters) : plant_(base, nominal) {
     for (const py::handle item : parameters) {
-      const auto parameter = item.cast<py::tuple>();  // values, step, acts
+      const auto parameter = item.cast<py::tuple>();  // values, step, acts and, if it has its own, inputs
       varied_.push_back({DelayedPlant(base, parameter[0].cast<Values>()), parameter[1].cast<double>(),
-                         acts_of(parameter[2].cast<std::string>())});
+                         acts_of(parameter[2].cast<std::string>()),
+                         parameter.size() > 3 ? std::make_unique<Inputs>(parameter[3].cast<py::dict>()) : nullptr});
     }
     std::vector<const DelayedPlant*> columns(1 + moving, &plant_);
     for (const Varied& one : varied_) columns.push_back(&one.plant);
     lanes_ = lanes_of(columns);
+    inputs_.resize(columns.size());
     starts_.resize(columns.size());
     steps_.resize(columns.size());
   }
@@ -288,16 +316,17 @@ class Lineariser {
   void pass(const Inputs& inputs, const Window& window, const double* start, std::ptrdiff_t w, std::ptrdiff_t origin,
             Sensitivities& to) {
     for (std::size_t i = 0; i < starts_.size(); ++i) {
+      inputs_[i] = i > moving && varied_[i - 1 - moving].own ? varied_[i - 1 - moving].own.get() : &inputs;
       std::copy_n(start, states, starts_[i].begin());
       steps_[i] = i > moving ? varied_[i - 1 - moving].step : 0.0;
       if (i == 0 || i > moving) continue;
       steps_[i] = 1e-5 * std::max(1.0, std::abs(start[angles + i - 1]));
       starts_[i][angles + i - 1] += steps_[i];
     }
-    if (lanes_ != nullptr && lanes_->pass(inputs, window, starts_)) {
+    if (lanes_ != nullptr && lanes_->pass(inputs_, window, starts_)) {
       keep_lanes(window, w, origin, to);
     } else {
-      one_by_one(inputs, window, w, origin, to);
+      one_by_one(window, w, origin, to);
     }
   }
 
@@ -321,10 +350,9 @@ class Lineariser {
         ends_at[i * columns] = (from.end(i, column) - to.end_at[w * states + i]) * per_step;
     }
   }
-  void one_by_one(const Inputs& inputs, const Window& window, std::ptrdiff_t w, std::ptrdiff_t origin,
-                  Sensitivities& to) {
+  void one_by_one(const Window& window, std::ptrdiff_t w, std::ptrdiff_t origin, Sensitivities& to) {
     double* const angle = to.angle_at - origin * angles;
-    const auto ends = run(plant_, inputs, window, starts_[0], [&](std::ptrdiff_t row, double a1, double a2) {
+    const auto ends = run(plant_, *inputs_[0], window, starts_[0], [&](std::ptrdiff_t row, double a1, double a2) {
       angle[row * angles] = a1;
       angle[row * angles + 1] = a2;
     });
@@ -334,7 +362,7 @@ class Lineariser {
       DelayedPlant& plant = column <= moving ? plant_ : varied_[column - 1 - moving].plant;
       const double step = steps_[column];
       const auto [rows_at, ends_at, columns] = place(column, window.first - origin, w, to);
-      const auto moved = run(plant, inputs, window, starts_[column],
+      const auto moved = run(plant, *inputs_[column], window, starts_[column],
                              [&, rows_at = rows_at, columns = columns](std::ptrdiff_t row, double a1, double a2) {
                                const std::ptrdiff_t at = (row - window.first) * angles;
                                rows_at[at * columns] = (a1 - angle[row * angles]) / step;
@@ -361,6 +389,7 @@ class Lineariser {
   DelayedPlant plant_;
   std::vector<Varied> varied_;
   std::unique_ptr<Lanes> lanes_;
+  std::vector<const Inputs*> inputs_;
   std::vector<std::array<double, states>> starts_;
   std::vector<double> steps_;
 };

@@ -1,10 +1,16 @@
 // What the readings of each window say to identification's filter (identification_filter.cpp).
 //
 // Within a window nothing but the counts' steps disturbs, so all of its readings together are one measurement of the
-// state at its start and of the parameters: their sums of squares and products say everything.
+// state at its start and of the parameters: their sums of squares and products say everything. With a the row of a
+// reading (derivatives by state and parameters), r its residual, rad, and w its weight,
+//
+//     gram = sum w a a',   cross = sum w a r,   square = sum w r^2,   log_weight = sum log w
 //
 // Where the instants of the readings jitter, both readings of a row share an error: their covariance, over that of the
-// counts' steps, is diag(1 / weight) + g g'. What the first reading tells of the second one's error is taken from it.
+// counts' steps, is diag(1 / w) + g g', g = jitter speed / sd (common_sd; jitter.py). So the first one has the weight
+// 1 / v1, v1 = 1 / w1 + g1^2, and of the second one what the first tells is taken (Cholesky):
+//
+//     a2 - (g1 g2 / v1) a1,   with the weight 1 / (1 / w2 + g2^2 - (g1 g2)^2 / v1)
 
 #include <Eigen/Core>
 #include <cmath>

@@ -203,8 +203,8 @@ def test_sensitivities_are_those_of_the_simulated_log(logs):
         if p.key == 'u0':
             continue
         h = 1e-4 * scale[i]
-        ends = [_core.trajectory(problem.base, problem.plant_values({**values, p.key: values[p.key] + sign * h}, 0), inputs,
-                                 piece.states[0])[:, :2] for sign in (1, -1)]
+        ends = [_core.trajectory(problem.base, problem.simulated(0, {**values, p.key: values[p.key] + sign * h})[0],
+                                 inputs, piece.states[0])[:, :2] for sign in (1, -1)]
         expected = (ends[0] - ends[1]) / (2e-4)
         found = piece.linear['by_parameter'][:len(expected) - 1, :, i]
         np.testing.assert_allclose(found, expected[:-1], rtol=2e-3, atol=2e-6)
@@ -502,10 +502,10 @@ def test_a_step_that_makes_it_worse_is_halved(logs, start):
     fit = start_fit(problem, {key: value for key, value in problem.base.values().items() if isinstance(value, float)})
     step(fit, fit.disturbances)
     good, states = fit.values, [piece.states for piece in fit.pieces]
-    linearise_where_better(fit, lambda: None)
+    linearise_where_better(fit)
     cost = float(fit.cost.sum())
     # Eight times the friction is a plant that no log here comes from: three halvings or more lead back.
     fit.values = {**good, 'theta_N': 8 * good['theta_N']}
-    fit.moved = Move(good, fit.values, states, fit.pieces, cost)
-    linearise_where_better(fit, lambda: None)
+    fit.moved = Move(good, states, cost)
+    linearise_where_better(fit)
     assert good['theta_N'] < fit.values['theta_N'] <= 1.9 * good['theta_N']

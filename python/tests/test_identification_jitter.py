@@ -29,7 +29,7 @@ def coasting(late_s, told_s=0.0, stamps_s=0.0):
 
 
 def found_in(log):
-    return jitter_of([log], [motion_of(log, COUNTS_PER_REV)], COUNTS_PER_REV)
+    return jitter_of([log], [motion_of(log, COUNTS_PER_REV)], COUNTS_PER_REV)[0]
 
 
 def test_jitter_is_found_where_it_is():

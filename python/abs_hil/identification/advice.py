@@ -1,6 +1,7 @@
 """What to run next: by how much each shipped experiment would narrow the intervals (D-optimal design)."""
+import dataclasses
 import pathlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from .found import Identified
 from .linear import keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
 from .parameters import EXPERIMENTS
-from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
+from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, pieces_of
 from .results import plant_settings
 
 #: factors below this are worth a word
@@ -51,7 +52,7 @@ def log_of(name: str, settings: Mapping[str, Value], phases: Sequence[float] | N
     return log
 
 
-def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[Advice]:
+def advise(found: Identified) -> list[Advice]:
     """The experiments, best first. Simulates each on the identified plant."""
     fit = found.fit
     free = fit.free
@@ -61,7 +62,7 @@ def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[
     disturbances = QUIET if found.disturbances is None else found.disturbances
     all_of_them = []
     for name in EXPERIMENTS:
-        check()
+        fit.problem.check()
         try:
             log = log_of(name, plant_settings(found))
         except ValueError:
@@ -79,9 +80,8 @@ def information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances)
     """The information of one more log at the estimate, in the scaled changes of `fit`."""
     old = fit.problem
     motion = motion_of(log, old.counts_per_rev)
-    problem = Problem(old.form, old.base, [log], [motion], [segments_of(log, motion)], old.given, old.fixed,
-                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, (), old.flaws,
-                      jitter_s=old.jitter_s)
+    problem = dataclasses.replace(old, logs=[log], motions=[motion], segments=[segments_of(log, motion)], drifts=(), discs=(),
+                                  slots={})
     values = {key: value for key, value in fit.values.items() if not key.startswith('brake_factor')}
     other = Fit(problem, values, pieces_of(problem, values, window_s), disturbances, window_s,
                 np.array([p.key not in old.fixed and p.key != 'u0' for p in problem.parameters]))

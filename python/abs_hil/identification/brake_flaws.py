@@ -2,18 +2,19 @@
 
 Dead time d, curvature c, fading k, cooling q and hysteresis h change the torque that the duty u asks for, before the lag (6):
 
-    b(t)    static torque of u(t - d) by (7)
+    b(t)    static torque of u(t - d) by (7), N m
     m(t)    b (1 + c (b / b(1) - 1))
-    f(t)    m exp(-k E),  E' = T w - q E the heat in the brake since the log began, J: of its torque T at the wheel's speed w
+    f(t)    m exp(-k E),  E' = T w - q E the heat in the brake since the log began, J: of its torque T, N m, at the wheel's
+            speed w, rad/s
     y(t)    f pulls y along only from outside of (1 - h) f ... (1 + h) f
 
-The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. How its readings change
-with c, k, q and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`. The
-lag itself has the rate c31, times the release ratio where the torque falls.
+The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. A dead time of whole rows and
+a part of one gives each row two of them, before and after that part. A derivative by whatever changes y is a difference of
+simulations on their own duties. The lag itself has the rate c31, times the release ratio where the torque falls.
 """
 import dataclasses
 import itertools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.signal
@@ -39,9 +40,15 @@ def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
 
 
 def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
-    """(7) at each row, N m."""
-    return np.where(log.brake_pwm >= values['u0'],
-                    np.maximum(0.0, values['b1_Nm'] * log.brake_pwm + values['b2_Nm']), 0.0)
+    """(7) at each row, N m; the mean over a row in which the duty changes."""
+    now = _static(log.brake_pwm, values)
+    if log.brake_before is None:
+        return now
+    return now + log.late_s / log.period_s * (_static(log.brake_before, values) - now)
+
+
+def _static(duty: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+    return np.where(duty >= values['u0'], np.maximum(0.0, values['b1_Nm'] * duty + values['b2_Nm']), 0.0)
 
 
 def act(values: Mapping[str, float]) -> bool:
@@ -50,35 +57,28 @@ def act(values: Mapping[str, float]) -> bool:
     return flawed and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
 
 
-def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:
+def with_flaws(log: Log, motion: Motion, values: Mapping[str, float], delay_s: float = 0.0) -> tuple[Log, Mapping[str, float]]:
     """The log with the brake's duties as a brake without flaws would need them, and the values of that brake: without u0,
-    below which a brake with flaws may well hold."""
+    below which a brake with flaws may well hold. delay_s: of all inputs, beside the brake's dead time."""
     if not act(values):
         return log, values
-    target = static_torques(log, values)
+    target = _static(log.brake_pwm, values)
     target = target * (1.0 + values.get(CURVATURE.key, 0.0) * (target / full_Nm(values) - 1.0))
-    target = _late(log, target, values.get(DEAD_TIME.key, 0.0))
+    whole, part = divmod((values.get(DEAD_TIME.key, 0.0) + delay_s) / log.period_s, 1.0)
+    rows = np.arange(len(log)) - int(whole)
+    targets = [target[np.maximum(rows - 1, 0)], target[np.maximum(rows, 0)]]  # before and after the part of a row
+    motor = log.motor_pwm  # has no lag: the mean over a row will do
+    asks = dataclasses.replace(log, late_s=part * log.period_s,
+                               motor_pwm=motor + delay_s / log.period_s * (np.append(motor[:1], motor[:-1]) - motor))
     if fading := values.get(FADING.key, 0.0):
-        asked = target
+        asked = targets
         for _ in range(3):  # the heat depends on the fading, weakly
-            target = asked * np.exp(-fading * heat_J(_asking(log, target, values), motion, {**values, 'u0': 0.0}))
+            keeps = np.exp(-fading * heat_J(_asking(asks, targets, values), motion, {**values, 'u0': 0.0}))
+            targets = [one * keeps for one in asked]
     if hysteresis := values.get(HYSTERESIS.key, 0.0):
-        target = _hanging(target, hysteresis)
-    return _asking(log, target, values), {**values, 'u0': 0.0}
-
-
-def amounts(log: Log, motion: Motion, values: Mapping[str, float], flaws: Collection[str]) -> dict[str, np.ndarray]:
-    """Of log and values as `with_flaws` gives them, at each row, for those of `flaws` that act on the duties: by how much
-    the torque's factor grows with c, k, q and h, and whether the brake alone acts, so that a delay of the inputs is a dead
-    time."""
-    static, torque = static_torques(log, values), brake_torques(log, values)
-    grows: dict[str, Callable[[], np.ndarray]] = {
-        FADING.key: lambda: -heat_J(log, motion, values),
-        COOLING.key: lambda: values.get(FADING.key, 0.0) * leaky(log, values.get(COOLING.key, 0.0), heat_J(log, motion, values)),
-        HYSTERESIS.key: lambda: fallen(static),
-        CURVATURE.key: lambda: static / full_Nm(values) - 1.0,
-        DEAD_TIME.key: lambda: ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)}
-    return {key: of() for key, of in grows.items() if key in flaws}
+        hanging = _hanging(np.stack(targets, axis=1).ravel(), hysteresis)
+        targets = [hanging[::2], hanging[1::2]]
+    return _asking(asks, targets, values), {**values, 'u0': 0.0}
 
 
 def full_Nm(values: Mapping[str, float]) -> float:
@@ -99,22 +99,9 @@ def leaky(log: Log, leaves_per_s: float, comes: np.ndarray) -> np.ndarray:
     return np.asarray(scipy.signal.lfilter([np.sqrt(keeps)], [1.0, -keeps], comes))
 
 
-def fallen(target: np.ndarray) -> np.ndarray:
-    """-1 from where the target rose last, 1 from where it fell last, 0 before either."""
-    change = np.sign(np.diff(target, prepend=target[0]))
-    return change[np.maximum.accumulate(np.where(change != 0, np.arange(len(change)), 0))] * -1.0
-
-
-def _asking(log: Log, target_Nm: np.ndarray, values: Mapping[str, float]) -> Log:
-    duty = (target_Nm - values['b2_Nm']) / values['b1_Nm']
-    return dataclasses.replace(log, brake_pwm=np.where(target_Nm > 0.0, duty, 0.0))
-
-
-def _late(log: Log, target: np.ndarray, dead_s: float) -> np.ndarray:
-    """The target of `dead_s` before. A part of a row is averaged: the lag is far longer than a row."""
-    whole, part = divmod(dead_s / log.period_s, 1.0)
-    rows = np.arange(len(target)) - int(whole)
-    return (1.0 - part) * target[np.maximum(rows, 0)] + part * target[np.maximum(rows - 1, 0)]
+def _asking(log: Log, targets_Nm: Sequence[np.ndarray], values: Mapping[str, float]) -> Log:
+    before, duty = (np.where(one > 0.0, (one - values['b2_Nm']) / values['b1_Nm'], 0.0) for one in targets_Nm)
+    return dataclasses.replace(log, brake_pwm=duty, brake_before=before)
 
 
 def _hanging(target: np.ndarray, hysteresis: float) -> np.ndarray:

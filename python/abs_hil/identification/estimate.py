@@ -1,5 +1,17 @@
-"""abs_hil.identify: a rig's parameters from its logs."""
+"""abs_hil.identify: a rig's parameters from its logs.
+
+The way of a fit: first values (start.py), both forms of tyre and load side by side down to disturbances of 0.1 % (choices.py),
+then down to none (fit.py). With the residual's root mean square R over n readings (by weight), in counts,
+
+    R^2 <= (1 + 4 * 0.894 / sqrt(n)) / 12      within four standard deviations of what the counts' steps leave (problem.py)
+
+nothing but these steps is left, and intervals follow (intervals.py). If more is left, duties as a board rounds them are tried,
+then flaws that the brake may have (structure.py), then a rig that wanders. Nothing is said of the rig by a fit that is not at
+rest (last step of at least one standard deviation) or leaves more than a count.
+"""
+import contextlib
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -8,12 +20,12 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
-from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
+from .fit import RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
-from .linear import run_filter, step
+from .linear import keep_normals, run_filter, to_rest
 from .logs import Log, load_log, motion_of
-from .parameters import ALL_FORMS, FORMS, WHEELS, checked_keys
-from .problem import DISTURBANCES, LARGEST_QUIET_RMS, QUIET, Fit, Problem
+from .parameters import ALL_FORMS, FORMS, RATE_LIMIT, WHEELS, checked_keys
+from .problem import DISTURBANCES, QUIET, Fit, Problem, residuals
 
 #: the wheels' radii differ by less than this factor: further from 1, the wheels did not roll on each other
 LARGEST_RATIO = 1.5
@@ -21,10 +33,12 @@ LARGEST_RATIO = 1.5
 LARGEST_RMS = 1.0
 #: no motor drives a rig this fast
 FASTEST_RAD_S = 2000.0
-#: a fit whose last step went farther than this, in standard deviations, has not arrived
-LARGEST_LAST_STEP = 5.0
+#: the disturbances at which causes are looked for first: those that the likelihood asks for would take them up
+SMALL = level(0.01)
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
 LARGEST_WANDER = 0.1
+#: the logs' mean disagreement by chance, at most
+CHANCE = 2.0
 #: what acts there and does not fit leaves the form of the tyre open
 AT_THE_CONTACT = ('road', 'r1_m')
 
@@ -66,159 +80,172 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     counts_per_rev = int(given['encoder_counts_per_rev'])
     _refuse_odd(loaded, values, counts_per_rev)
 
-    fits: list[Fit] = []
     begun: list[Fit] = []
     forms = FORMS if FORMS[start_form].settings['plant.load'] == given['load'] else {
         one.name: one for one in ALL_FORMS if one.settings['plant.load'] == given['load']}
     for tried in forms.values() if form == 'auto' else (forms[form],):
         say(f'{tried.meaning}: first values')
-        problem = Problem.of(tried, start, loaded, fix, drift, WHEELS)
+        problem = dataclasses.replace(Problem.of(tried, start, loaded, fix, drift, WHEELS), say=say, check=check)
         if not any(problem.segments):
             upper, lower = np.max([motion.speed_rad_s.max(axis=0) for motion in problem.motions], axis=0)
             raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s): with '
                              f'{counts_per_rev} counts per revolution the upper wheel reaches {upper:.3g} rad/s, the lower one '
                              f'{lower:.3g}; are the counts of another unit?')
         try:
-            begun.append(start_fit(problem, values, check, begun[0] if begun else None))
-            # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
-            fits.append(choices.started(begun[-1], check))
+            begun.append(start_fit(problem, values, begun[0] if begun else None))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{tried.meaning}: cannot be fitted ({error})')
-    if not fits:
+    if not begun:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
-    fit, decided = (fits[0], True) if len(fits) == 1 else choices.better_form(fits, start_form, check, say, notes)
+    fits, decided = choices.better_form(begun, start_form, notes)
     try:
-        finished = _likelier([fit, *(one for one in fits if one is not fit)], seed, say, check)
+        finished = _likelier(fits, seed)
     except KeyboardInterrupt:
-        return interrupted(fit, str(start), notes)
+        return interrupted(fits[0], str(start), notes)
     of_logs = list(notes)
     found = assembled(finished, str(start), notes)
-    found.disagreement = disagreement(finished.fit)
-    if why := _doubt(found, finished):
-        causes = finished.causes or finished.hidden
+    of_all = finished.fit.copy()
+    if finished.disturbances is not None:  # to disagree by less is no reason to refuse a rig
+        keep_normals(of_all, run_filter(of_all, finished.disturbances.at_least())[1])
+    found.disagreement = disagreement(of_all, finished.spread.scores)
+    if why := finished.misfit or _doubt(found):
+        causes = finished.causes
         off = (causes[0].cause.acts if causes else
                DISTURBANCES[int(np.argmax(finished.disturbances.sd[:3]))] if finished.disturbances is not None else '')
-        refuse(found, why, of_logs, not decided or (form == 'auto' and off in AT_THE_CONTACT))
+        open_form = off in AT_THE_CONTACT or not finished.fit.last_step < RESTS
+        refuse(found, why, of_logs, not decided or (form == 'auto' and open_form))
     elif not decided:
         leave_form_open(found)
     return found
 
 
-def _doubt(found: Identified, finished: Finished) -> str:
-    """Why the logs do not fit this plant; empty if they do."""
-    if finished.causes:
-        return structure.sentence(finished.causes, finished.fit)
-    if found.residual_counts_rms > LARGEST_RMS:
-        return (f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
-                f'{LARGEST_RMS:g} is expected even of a rig that wanders')
+def _doubt(found: Identified) -> str:
+    """Why the logs do not fit each other; empty if they do."""
     odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
-    hidden = f'{structure.sentence(finished.hidden, finished.fit)}. If that is not it: ' if finished.hidden else ''
     factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
-    if found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
-        return 'the fit does not settle: the logs tell too little, or the model does not follow them'
     if factor > LARGEST_WANDER:
-        return (f'{hidden}the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % '
+        return (f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % '
                 'would explain them with one set of parameters. Are they of one rig, and of one state of its brake and tyre?')
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
-        return (f'{hidden}the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, '
+        return (f'the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, '
                 'expected 1); is it of another rig, has something changed between the logs, or is the brake weaker in some of '
                 'them (--drift brake_torque)?')
     return ''
 
 
-def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    say(f'{fit.problem.form.meaning}: fit')
-    # Without disturbances a fit to the logs of a rig that wanders may go anywhere: the other one begins where this one does.
-    undisturbed = _undisturbed(fit.copy(), check, say)
-    if undisturbed is None or (left := _left_by(undisturbed)):
-        say(f'{left if undisturbed else "no fit without disturbances"}: the rig wanders, or the model lacks something')
-        try:
-            fit, first_causes, cost = _explained_first(fit, check, say)
-            fit = disturbed_fit(fit, check, say)
-            limited = choices.started(fit, check)
-            fit = fit if limited is fit else disturbed_fit(limited, check, say)
-            while (found := structure.explained(fit, fit.disturbances, check, say))[0] is not fit:
-                fit = disturbed_fit(found[0], check, say)
-            causes = found[1]
-            if first_causes and any(one.cause is first_causes[0].cause for one in causes):
-                causes = first_causes  # surer
-        except (ValueError, np.linalg.LinAlgError) as error:
-            raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
-                             ) from None
-        disturbances = fit.disturbances
-    else:
-        fit, disturbances, causes, first_causes, cost = undisturbed, QUIET, [], [], 0.0
-    if not np.isfinite(fit.rms_counts):
-        raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
-    fit = choices.settle(fit, disturbances, check)
-    fit, round_discs = intervals.settle_discs(fit, disturbances, check)
-    gaps = likely_u0(fit, disturbances, check)
-    say('intervals')
-    if disturbances is QUIET:
-        spread = intervals.bootstrap(fit, seed, check=check)
-    else:
-        spread = intervals.information(fit, structure.unsettled(fit, disturbances))
-    return Finished(fit, spread, gaps, None if disturbances is QUIET else disturbances, round_discs, causes, first_causes, cost)
-
-
-def _left_by(undisturbed: Fit) -> str:
-    """What says that more than the counts' steps disturbed the rig; empty if nothing does."""
-    if not undisturbed.rms_counts <= LARGEST_QUIET_RMS:
-        return f'residual {undisturbed.rms_counts:.3g} counts RMS'
-    most = max(disagreement(undisturbed).values(), default=0.0)
-    return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
-
-
-def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    """The first form if it needs no cause which the plant lacks, or one that nothing but the counts' steps disturbs. Else the
-    form that is likelier with its surest cause: the disturbances of a wrong form may hide every cause."""
+def _likelier(fits: Sequence[Fit], seed: int) -> Finished:
+    """The first form that follows the logs without disturbances, else the first that needs nothing which the plant lacks, else the
+    first."""
+    for fit in fits:
+        fit.problem.say(f'{fit.problem.form.meaning}: fit')
+        if (quiet := _quiet(fit)) is not None:
+            return _settled(quiet, seed)
     done: list[Finished] = []
     failed = ''
     for fit in fits:
         try:
-            done.append(_finished(fit, seed, say, check))
-        except ValueError as error:
-            failed = failed or str(error)
-            continue
-        if not done[-1].causes and (len(done) == 1 or done[-1].disturbances is None):
+            done.append(_explained(fit, seed))
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failed = failed or f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
+        if done and (not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None)):
             return done[-1]
     if not done:
         raise ValueError(failed)
-    return min(done, key=lambda one: one.cost)
+    return done[0]
 
 
-def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
-    """The fit with the flaws that it shows while small disturbances are allowed: those that the likelihood asks
-    for would take the flaws up. With the causes that are left, and -2 log likelihood with the surest of them."""
-    disturbances = ROUNDS[1][0]
-    near = choices.without(fit)  # a limit that was found may stand for a flaw
-    for _ in range(3):
-        step(near, disturbances, check)
-    if search_u0(near, disturbances, 0.01, 9, check):
-        step(near, disturbances, check)
-    if not near.rms_counts <= LARGEST_RMS:
-        return fit, [], np.inf  # too far off to tell anything
-    flawed, left = structure.explained(near, disturbances, check, say)
-    if flawed is not near:
-        flawed, left = structure.explained(choices.started(flawed, check), disturbances, check, say)
-    cost = run_filter(flawed, disturbances)[0] - (left[0].sure**2 if left else 0.0)
-    return (fit if flawed is near else flawed), left, cost
+def _quiet(fit: Fit) -> Fit | None:
+    """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
+    board gives them; with late inputs and a limit of the brake's rate where the logs show them."""
+    stopped = 0.0
+    for takes_up, tried in itertools.chain([(np.inf, fit)], choices.with_steps(fit)):
+        if stopped > takes_up:
+            continue
+        try:
+            found = finish_fit(tried.copy()) if tried is not fit or fit.may_follow else fit
+            stopped = stopped or float(found.disturbances.sd[0])
+            for remedy in (choices.with_delay, choices.sought):
+                if (more := remedy(found)) is not found and finish_fit(more).follows:
+                    found = more
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        if not (left := _left_by(found)):
+            return found
+        fit.problem.say(left)
+    return None
 
 
-def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
-    """The fit as if nothing disturbed the rig but the counts' steps; None if it ends nowhere."""
-    try:
-        fit = choices.with_delay(finish_fit(fit, check), check, say)
-        if fit.rms_counts <= LARGEST_QUIET_RMS:
-            limited = choices.sought(fit, QUIET, check)
-        else:
-            near = fit.copy()
-            step(near, ROUNDS[-1][0], check)
-            limited = choices.started(near, check)
-            limited = fit if limited is near else limited
-        return fit if limited is fit else finish_fit(limited, check)
-    except (ValueError, np.linalg.LinAlgError):
-        return None
+def _settled(quiet: Fit, seed: int) -> Finished:
+    quiet, round_discs = intervals.settle_discs(choices.settle(quiet))
+    gaps = likely_u0(quiet)
+    quiet.problem.say('intervals')
+    return Finished(quiet, intervals.bootstrap(quiet, seed), gaps, None, round_discs)
+
+
+def _explained(fit: Fit, seed: int) -> Finished:
+    """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
+    fit.problem.say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
+    flawed, first_causes = _flawed(fit)
+    if flawed is not fit and (quiet := _quiet(flawed)) is not None:
+        return _settled(quiet, seed)
+    fit = disturbed_fit(flawed)
+    limited = choices.sought(fit)
+    fit = fit if limited is fit else disturbed_fit(limited)
+    while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
+        if (quiet := _quiet(found[0].without([RATE_LIMIT.key]))) is not None:
+            return _settled(quiet, seed)
+        fit = disturbed_fit(found[0])
+    causes = found[1]
+    if first_causes and any(one.cause is first_causes[0].cause for one in causes):
+        causes = first_causes  # surer
+    fit, round_discs = intervals.settle_discs(choices.settle(fit))
+    gaps = likely_u0(fit)
+    misfit = ''
+    if not (fit.last_step < RESTS and fit.rms_counts <= LARGEST_RMS):
+        misfit = (f'the fit did not get there (last step {fit.last_step:.3g} standard deviations, residual {fit.rms_counts:.3g} '
+                  f'counts RMS): nothing is said of the rig. Most is left in {_most_left(fit)}')
+        causes = []
+    elif causes and structure.named(causes):
+        misfit = structure.sentence(causes, fit)
+    elif causes:
+        misfit = f'the model lacks something, most in {_most_left(fit)}; no single cause explains it'
+    fit.problem.say('intervals')
+    # What changed between the logs by more than chance makes all of them less certain (Birge 1932).
+    birge = float(np.mean([*disagreement(fit).values()] or [1.0]))
+    unsure = 0.0 if misfit else structure.unsettled(fit, fit.disturbances)
+    spread = intervals.information(fit, unsure, birge if birge > CHANCE else 1.0)
+    return Finished(fit, spread, gaps, fit.disturbances, round_discs, causes, misfit)
+
+
+def _most_left(fit: Fit) -> str:
+    """Where the model lacks most: by what is left without disturbances."""
+    near = fit.copy()
+    with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+        to_rest(near, QUIET, 3)
+    left = ', '.join(f'{log}{f", phase {phase}," if phase else ""} {rms:.3g}' for rms, log, phase in residuals(near)[:3])
+    return f'{left} counts RMS without disturbances'
+
+
+def _left_by(quiet: Fit) -> str:
+    """What says that more than the counts' steps disturbed the rig; empty if nothing does."""
+    if not (quiet.follows and quiet.last_step < RESTS):
+        return (f'residual at least {max(quiet.rms_counts, quiet.least_rms):.4g} counts RMS without disturbances, at most '
+                f'{quiet.bound_rms:.4f} by the steps of the counts')
+    most = max(disagreement(quiet).values(), default=0.0)
+    return f'the logs disagree (chi-square per degree of freedom up to {most:.3g})' if most > LARGEST_DISAGREEMENT else ''
+
+
+def _flawed(fit: Fit) -> tuple[Fit, list[structure.Found]]:
+    """The fit with the flaws that it shows while small disturbances are allowed, if it rests there, and the causes that are left:
+    the disturbances that the likelihood asks for would take them up."""
+    near = fit.without([RATE_LIMIT.key])  # it may stand for a flaw
+    to_rest(near, SMALL, 10, RESTS)
+    if search_u0(near, 0.01, 9):
+        to_rest(near, SMALL, 3, RESTS)
+    if not (near.rms_counts <= LARGEST_RMS and near.last_step < RESTS):
+        return fit, []  # too far off to tell anything
+    flawed, left = structure.explained(near, SMALL)
+    return (fit, left) if flawed is near else structure.explained(choices.sought(flawed), SMALL)
 
 
 def _refuse_odd(logs: Sequence[Log], plant: Mapping[str, float], counts_per_rev: int) -> None:

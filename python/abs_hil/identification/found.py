@@ -6,6 +6,7 @@ from typing import Any, Self, TypeGuard
 import numpy as np
 
 from . import choices, intervals, structure
+from .linear import solved
 from .logs import Log
 from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
@@ -52,7 +53,7 @@ class Estimate:
 class Identified:
     """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell; misfit: why the
     logs give no model of the plant, empty if they do; undecided: they do not tell the form of the tyre, or their tyre is
-    of no form; wanted: those notes that say what to run."""
+    of no form; refused: its values are those of no rig; wanted: those notes that say what to run."""
     form: str
     start: str
     parameters: dict[str, Estimate]
@@ -68,6 +69,7 @@ class Identified:
     interrupted: bool = False
     misfit: str = ''
     undecided: bool = False
+    refused: bool = False
     wanted: list[str] = field(default_factory=list)
 
     def values(self) -> dict[str, float]:
@@ -78,16 +80,14 @@ class Identified:
 @dataclass
 class Finished:
     """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
-    discs that no log shows, what the disturbances have in common that the plant lacks, what small ones had that these took up,
-    and -2 log likelihood with small disturbances and the surest of those causes."""
+    discs that no log shows, what the disturbances have in common that the plant lacks, why the logs give no model."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
     disturbances: Disturbances | None
     round_discs: dict[str, float]
     causes: list[structure.Found] = field(default_factory=list)
-    hidden: list[structure.Found] = field(default_factory=list)
-    cost: float = 0.0
+    misfit: str = ''
 
 
 def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
@@ -104,7 +104,7 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
 
 def refuse(found: Identified, why: str, of_logs: list[str], undecided: bool) -> None:
     """The logs do not fit the plant: the values are the last ones of the fit, and nothing is promised of them."""
-    found.misfit, found.undecided = why, undecided
+    found.misfit, found.undecided, found.refused = why, undecided, True
     found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written',
                       *(note for note in of_logs if not (undecided and note.startswith('form: '))),
                       *(note for note in found.wanted if all(log.experiment for log in found.logs) and 'among the' not in note)]
@@ -142,7 +142,7 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             parameters[p.key] = Estimate.fixed(value, p.unit)
             continue
         if p.key == 'u0':
-            parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
+            parameters[p.key] = _u0(value, finished.gaps if _known(parameters.get('b1_Nm')) else [])
             if _told_by_no_log(parameters, notes):
                 continue
             if parameters[p.key].status != 'identified':
@@ -167,6 +167,8 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
     for wheel, slots in problem.slots.items():
         parameters[f'{wheel}_encoder_slot_error_counts'] = Estimate.normal(slots.error_counts, slots.sd_counts, '1')
         notes.append(f'every second edge of the {wheel} encoder comes late by {slots.error_counts:.2g} of a count')
+    if problem.pwm_steps:
+        notes.append(f"the board gives duties in {problem.pwm_steps} steps; the logs' own were rounded to them before the fit")
     if problem.jitter_s > 0.0:
         notes.append(f'the encoders were read {1e6 * problem.jitter_s:.2g} us early or late (standard deviation); the intervals '
                      'count with it, and would be narrower with the true times in a column sample_time_s')
@@ -255,31 +257,36 @@ def _known(estimate: Estimate | None) -> TypeGuard[Estimate]:
     return estimate is not None and estimate.status in ('identified', 'fixed')
 
 
-def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
-    """identified if the logs exclude smaller and larger values, bounded if one of them. Without the brake's line, which tells
-    what a duty above u0 does, nothing is excluded."""
-    value = fit.values['u0']
-    smaller, larger = intervals.excluded(gaps)
-    if not (smaller or larger):
+def _u0(value: float, gaps: list[tuple[float, float, float]]) -> Estimate:
+    """From the first to the last gap between duties that is not less likely than the best by 95 %: identified if smaller and
+    larger values are, bounded if one of them is. Without the brake's line, which tells what a duty does, there are no gaps."""
+    least = min((gap[2] for gap in gaps), default=0.0) + intervals.LIKELY
+    likely = [i for i, gap in enumerate(gaps) if gap[2] <= least] or [0]
+    below, above = gaps[:likely[0]], gaps[likely[-1] + 1:]
+    if not (below or above):
         return Estimate(value, None, None, 'not-identifiable', '1')
-    low, high = intervals.u0_interval(gaps)
-    certain = smaller and larger and high - low <= LARGEST_SD * value
-    return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
+    low, high = below[-1][1] if below else gaps[0][0], above[0][0] if above else 1.0
+    certain = below and above and high - low <= LARGEST_SD * value
+    return Estimate(value, low, high, 'identified' if certain else 'bounded', '1')
 
 
-def disagreement(fit: Fit) -> dict[str, float]:
+def disagreement(fit: Fit, scores: np.ndarray | None = None) -> dict[str, float]:
     """Of each log against all of them, by its name: the score of the log alone at the joint estimate, as chi-square over its
-    degrees of freedom. Empty for one log."""
+    degrees of freedom. Empty for one log. Its variances are the filter's, for errors that are independent; or those of `scores`
+    (intervals.bootstrap): where a wheel turns by nearly whole counts a row, errors follow each other."""
     out: dict[str, float] = {}
     logs = fit.problem.logs
     inverse = fit.covariance()
-    for log, Nl, nl in zip(logs, fit.normal, fit.right) if len(logs) > 1 else ():
+    joint = solved(fit, fit.normal.sum(axis=0), fit.right.sum(axis=0))
+    for number, (log, Nl, nl) in enumerate(zip(logs, fit.normal, fit.right)) if len(logs) > 1 else ():
         told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
         d = 1 / np.sqrt(np.diag(Nl)[told])
         covariance = (Nl - Nl @ inverse @ Nl)[np.ix_(told, told)] * np.outer(d, d)
         values, vectors = np.linalg.eigh(covariance)
         kept = values > 1e-3  # what the log has in common with others; the rest is its own, and rounding
         if kept.any():
-            z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
-            out[log.name] = float(z @ z / kept.sum())
+            along, variance = vectors.T[kept] * d, values[kept]
+            if scores is not None:  # the mean of 1 / their variance's estimate is larger by draws / (draws - 2)
+                variance = np.sum((along @ scores[number][told])**2, axis=1) / (scores.shape[2] - 2)
+            out[log.name] = float(np.mean((along @ (nl - Nl @ joint)[told])**2 / variance))
     return out

@@ -1,7 +1,6 @@
 """Intervals of 95 %: by quantising the fitted motion anew with other encoder phases (parametric bootstrap) where only the
 counts' steps disturb, by the information of the filter where the rig wanders. And what the logs say of eccentric discs."""
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import scipy.stats
 from ..core import _core
 from .linear import filtered, solved, to_rest
 from .parameters import COMBINATIONS, WHEELS, disc_of
-from .problem import COUNT_VARIANCE, QUIET, Disturbances, Fit
+from .problem import COUNT_VARIANCE, QUIET, Fit
 from .slots import middles
 
 REPLICATES = 80
@@ -26,24 +25,27 @@ CHANCE = 1e-6
 @dataclass
 class Spread:
     """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free. `of_logs`: the part
-    of it that the logs' own errors make, for combinations that hardly depend on the first values."""
+    of it that the logs' own errors make, for combinations that hardly depend on the first values; scores: of each log alone at
+    the joint estimate of each draw, (logs, n, draws)."""
     covariance: np.ndarray
     of_logs: np.ndarray
+    scores: np.ndarray | None = None
 
 
-def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None) -> Spread:
+def bootstrap(fit: Fit, seed: int = 1) -> Spread:
     """Spread of the estimates over random encoder phases. The estimate is linear in the counts near the solution."""
     problem = fit.problem
     per_count = problem.radians_per_count
     random = np.random.default_rng(seed)
     phases = random.uniform(size=(len(problem.logs), 2, REPLICATES))
     late = np.array([[[problem.slots[wheel].error_counts if wheel in problem.slots else 0.0] for wheel in WHEELS]])
-    estimates = []
+    estimates, scores = [], []
     for begin in range(0, REPLICATES, _BATCH):
-        check()
+        problem.check()
         chosen = phases[:, :, begin:begin + _BATCH]
         size = len(fit.scale)
-        N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
+        logs = len(problem.logs)
+        N, n = np.zeros((logs, size, size)), np.zeros((logs, size, chosen.shape[2]))
         for piece in fit.pieces:
             exact = piece.linear['read'] / per_count
             phase = chosen[piece.log][None]
@@ -56,50 +58,31 @@ def bootstrap(fit: Fit, seed: int = 1, check: Callable[[], None] = lambda: None)
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros((*piece.states.shape, chosen.shape[2]))}
             changed.update(_core.condense(changed))
             found = filtered(fit, [dataclasses.replace(piece, linear=changed)], QUIET)[0]
-            N, n = N + found[0], n + found[1]
-        shift = solved(fit, N, np.zeros(size))  # what the prior alone does
-        estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
-    scatter = np.cov(np.transpose(estimates))
+            N[piece.log] += found[0]
+            n[piece.log] += found[1]
+        whole = N.sum(axis=0)
+        shift = solved(fit, whole, np.zeros(size))  # what the prior alone does
+        some = np.transpose([solved(fit, whole, right) - shift for right in n.sum(axis=0).T])
+        estimates.append(some)
+        scores.append(n - N @ some)
+    scatter = np.cov(np.concatenate(estimates, axis=1))
     # The first values' errors add to it: all of it where the logs tell nothing.
     known = fit.covariance()
-    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter)
+    return Spread(scatter + known @ np.diag(fit.prior()[0]) @ known, scatter, np.concatenate(scores, axis=2))
 
 
-def information(fit: Fit, more: np.ndarray | float = 0.0) -> Spread:
-    """Spread by the filter's information, and by `more` (structure.unsettled)."""
-    return Spread(fit.covariance() + more, fit.covariance() + more)
+def information(fit: Fit, more: np.ndarray | float = 0.0, wider: float = 1.0) -> Spread:
+    """Spread by the filter's information, `wider` times, and by `more` (structure.unsettled)."""
+    return Spread(wider * fit.covariance() + more, wider * fit.covariance() + more)
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
     """(value, standard deviation) of a combination of parameters."""
-    _, parts, _ = COMBINATIONS[name]
-    keys = fit.keys
-    values = np.array([fit.values[key] for key in parts])
-    gradient = np.zeros(len(keys))
+    at, values = zip(*((fit.keys.index(key), fit.values[key]) for key in COMBINATIONS[name][1]))
     product = name == 'theta_B_C_N'
     value = float(np.prod(values) if product else np.sum(values))
-    for key, part in zip(parts, values):
-        i = keys.index(key)
-        gradient[i] = fit.scale[i] * (value / part if product else 1.0)
-    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs @ gradient)))
-
-
-def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:
-    """Whether the logs exclude a smaller and a larger u0 than those that are likely."""
-    if len(gaps) < 2:
-        return False, False
-    least = min(gap[2] for gap in gaps) + LIKELY
-    return gaps[0][2] > least, gaps[-1][2] > least
-
-
-def u0_interval(gaps: list[tuple[float, float, float]]) -> tuple[float, float]:
-    """From the first to the last gap between duties that is not less likely than the best by 95 %, or that lies beside
-    one that was not tried."""
-    least = min(gap[2] for gap in gaps) + LIKELY
-    kept = [i for i, gap in enumerate(gaps) if gap[2] <= least]
-    low = gaps[kept[0] - 1][1] if kept[0] > 0 else gaps[0][0]
-    high = gaps[kept[-1] + 1][0] if kept[-1] + 1 < len(gaps) else gaps[-1][1]
-    return low, high
+    gradient = fit.scale[list(at)] * (value / np.array(values) if product else 1.0)
+    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs[np.ix_(at, at)] @ gradient)))
 
 
 def _places(fit: Fit, wheel: str) -> np.ndarray:
@@ -116,7 +99,7 @@ def _information(fit: Fit, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, fit.covariance()[np.ix_(chosen, chosen)] * np.outer(scale, scale)
 
 
-def settle_discs(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> tuple[Fit, dict[str, float]]:
+def settle_discs(fit: Fit) -> tuple[Fit, dict[str, float]]:
     """The fit without the discs that its logs do not show, and the largest eccentricity that each of these may have, from
     the log that says most (95 %)."""
     largest: dict[str, float] = {}
@@ -133,7 +116,7 @@ def settle_discs(fit: Fit, disturbances: Disturbances, check: Callable[[], None]
         return fit, largest
     fit = fit.changed({}, discs=tuple(wheel for wheel in fit.problem.discs if wheel not in largest))
     fit.values = {key: value for key, value in fit.values.items() if '_disc_' not in key or key in fit.keys}
-    to_rest(fit, disturbances, 4, check)
+    to_rest(fit, fit.disturbances, 4)
     return fit, largest
 
 

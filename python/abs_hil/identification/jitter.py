@@ -30,20 +30,21 @@ LEAST_BLOCKS = 8
 SURE = 5.0
 
 
-def jitter_of(logs: Sequence[Log], motions: Sequence[Motion], counts_per_rev: int) -> float:
-    """The standard deviation of the readings' instants, s, of all logs together; 0 if they do not show one."""
+def jitter_of(logs: Sequence[Log], motions: Sequence[Motion], counts_per_rev: int) -> tuple[float, float]:
+    """The standard deviation of the readings' instants, s, of all logs together, 0 if they do not show one; and that of its
+    square, over its square."""
     blocks = np.concatenate([_blocks(log, motion, 2 * np.pi / counts_per_rev) for log, motion in zip(logs, motions)])
     if len(blocks) < LEAST_BLOCKS:
-        return 0.0
+        return 0.0, 0.0
     rows, product, covariance = blocks.T
     x = product - np.average(product, weights=rows)
     y = covariance - np.average(covariance, weights=rows)
     information = float(rows @ x**2)
     if not information > 0.0:
-        return 0.0
+        return 0.0, 0.0
     square = float(rows @ (x * y)) / information
     sd = float(np.sqrt((rows * x)**2 @ (y - square * x)**2)) / information
-    return float(np.sqrt(square)) if square > SURE * sd else 0.0
+    return (float(np.sqrt(square)), sd / square) if square > SURE * sd else (0.0, 0.0)
 
 
 def _blocks(log: Log, motion: Motion, per_count_rad: float) -> np.ndarray:

@@ -1,13 +1,24 @@
-"""The linearised plant over the logs, and one step of the fit: sensitivities, the filter's normal equations, new states."""
+"""The linearised plant over the logs, and one step of the fit: sensitivities, the filter's normal equations, new states.
+
+The filter (python/src/identification_filter.cpp) gives for the scaled changes dp of the parameters, summed over all logs
+
+    -2 log L(dp) = s - 2 n'dp + dp'N dp + log |S|            but for a constant
+
+One step (Gauss and Newton) takes (N + P) dp = n + P d, with the precision P of the first values and the way d to them, within
+bounds; then the states that are most likely at this dp. It has gone sqrt(dp'(N + P) dp) standard deviations. A step after which
+-2 log L is larger is halved. Logs l that are left out are foretold by all others: with dp from N - N_l and n - n_l,
+
+    -2 log L_l = s_l - 2 n_l'dp + dp'N_l dp
+"""
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..core import _core
-from .brake_flaws import amounts
+from .brake_flaws import act
 from .parameters import DEAD_TIME, DELAY, WHEELS, disc_of
-from .problem import Disturbances, Fit, Move, Piece, Problem
+from .problem import COUNT_VARIANCE, Disturbances, Fit, Move, Piece, Problem
 
 #: an iteration that moves less, in standard deviations, is the last
 CONVERGED = 0.1
@@ -17,48 +28,48 @@ LARGEST_STEP = 0.3
 #: plant, and not exact to less
 LARGEST_RISE = 10.0
 MOST_HALVINGS = 6
-#: the disturbance that is a factor over the brake's torque
-BRAKE_FACTOR = 1
 #: how far a piece's first state may move in one iteration: angles, speeds, brake torque
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 
 
 def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
-              check: Callable[[], None] = lambda: None) -> np.ndarray:
-    """Fills `linear` of each piece; returns the scale of the parameters' changes."""
+              fill: Callable[[Piece, np.ndarray], None] | None = None) -> np.ndarray:
+    """Fills `linear` of each piece; returns the scale of the parameters' changes. `fill` adds to a piece's columns, before only
+    the filter's sums of them are kept."""
     scale = np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
-    own = {'u0': _duty_step(problem, values['u0']), DELAY: 1e-5}
+    own = {'u0': _duty_step(problem, values['u0']), DELAY: 1e-5, DEAD_TIME.key: 1e-6}
     steps = [own.get(p.key, 1e-5 * one) for p, one in zip(problem.parameters, scale)]
     steps = [size if values[p.key] + size <= p.most else -size for p, size in zip(problem.parameters, steps)]
     for number in range(len(problem.logs)):
-        log, brake = problem.flawed(number, values)
-        inputs = log.inputs()
+        asks, acts = problem.flawed(number, values), act(values)
         there = problem.columns(number)
-        simulated = np.array([problem.parameters[i].acts not in ('reading', 'flaw') for i in there])
-        nominal = problem.plant_values(values, number)
+        simulated = np.array([problem.parameters[i].acts not in ('reading', 'cause') for i in there])
         moved = []
         for i in there[simulated]:
             p = problem.parameters[i]
-            other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
-            moved.append((other, steps[i] / scale[i], p.acts))
-        if DEAD_TIME.key in problem.flaws:  # the derivative by a delay of the brake alone
-            later = {**values, DELAY: values.get(DELAY, 0.0) + 1e-5}
-            moved.append((problem.plant_values(later, number), 1e-5, 'brake'))
-        amount = amounts(log, problem.motions[number], brake, problem.flaws) if problem.flaws else {}
+            changed = {**values, p.key: values[p.key] + steps[i]}
+            brakes = p.acts == 'flaw' or p.key in ('b1_Nm', 'b2_Nm', DELAY)  # what flaws make of the duties depends on these
+            asked = problem.flawed(number, changed) if brakes or not acts else asks
+            moved.append((problem.plant_values(changed, number, asked), steps[i] / scale[i],
+                          'brake' if p.acts == 'flaw' else p.acts, *((asked[0].inputs(),) if brakes and act(changed) else ())))
+        nominal, inputs = problem.plant_values(values, number, asks), asks[0].inputs()
         for piece in pieces:
             if piece.log != number:
                 continue
-            check()
+            problem.check()
             piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
             piece.columns = there
             if not simulated.all():
-                few = {name: piece.linear[name] for name in ('by_parameter', 'end_by_parameter')}
-                for name, simulated_ones in few.items():
-                    piece.linear[name] = np.zeros((*simulated_ones.shape[:2], len(there)))
-                    piece.linear[name][:, :, simulated] = simulated_ones[:, :, :simulated.sum()]
-                _by_flaws(problem, values, scale, piece, amount, {name: one[:, :, -1] for name, one in few.items()})
+                for name in ('by_parameter', 'end_by_parameter'):
+                    few = piece.linear[name]
+                    piece.linear[name] = np.zeros((*few.shape[:2], len(there)))
+                    piece.linear[name][:, :, simulated] = few
                 _read_by_discs(problem, scale, piece)
+            if fill is not None:
+                fill(piece, scale)
             measure(problem, values, piece, [piece.linear['angles']], [piece.linear['end']])
+            if fill is not None:
+                del piece.linear['by_parameter'], piece.linear['by_state']
     return scale
 
 
@@ -66,20 +77,6 @@ def by_windows(piece: Piece, per_row: np.ndarray) -> np.ndarray:
     """The mean of a log's rows in each window, shape (windows,)."""
     first = piece.first - piece.first[0]
     return np.asarray(np.add.reduceat(per_row[piece.rows], first[:-1]) / np.diff(first))
-
-
-def _by_flaws(problem: Problem, values: Mapping[str, float], scale: np.ndarray, piece: Piece, amount: Mapping[str, np.ndarray],
-              by_delay: Mapping[str, np.ndarray]) -> None:
-    """Derivatives by the brake's flaws, from those by its torque and by a delay. A flaw acts alike within a window."""
-    torque = _relative(problem, values, scale)[BRAKE_FACTOR, piece.columns]
-    lengths = np.diff(piece.first)
-    for key in amount:
-        i = problem.keys.index(key)
-        column = int(np.flatnonzero(piece.columns == i)[0])
-        share = scale[i] * by_windows(piece, amount[key])
-        for name, of in (('by_parameter', np.repeat(share, lengths)), ('end_by_parameter', share)):
-            by = by_delay[name] if key == DEAD_TIME.key else piece.linear[name] @ torque
-            piece.linear[name][:, :, column] = of[:, None] * by
 
 
 def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:
@@ -124,8 +121,7 @@ def disc_waves_rad(problem: Problem, values: Mapping[str, float], log: int, angl
 
 def _duty_step(problem: Problem, u0: float) -> float:
     """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
-    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
-    near = np.sort(np.abs(duties - u0))
+    near = np.sort(np.abs(problem.duties - u0))
     return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
 
 
@@ -167,8 +163,7 @@ def filtered(fit: Fit, pieces: Sequence[Piece], disturbances: Disturbances) -> l
     return out
 
 
-def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
-           high: np.ndarray | None = None) -> np.ndarray:
+def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None, high: np.ndarray | None = None) -> np.ndarray:
     """The likeliest change of the parameters, 0 for those that are not free. The prior decides what the logs do not. A
     parameter that would leave its range stops at the range's end, and the others follow: they may depend on it."""
     x = np.zeros(len(n))
@@ -191,11 +186,11 @@ def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None
     return x
 
 
-def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
+def step(fit: Fit, disturbances: Disturbances) -> float:
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
-    found = linearise_where_better(fit, check)
+    found = linearise_where_better(fit)
     if found is None or disturbances is not fit.disturbances:
         _, found = run_filter(fit, disturbances)
     fit.disturbances = disturbances
@@ -209,45 +204,52 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
         low = np.where(sizes, np.log(np.maximum(least, 1e-12) / values), (least - values) / fit.scale)
         high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
     x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
+    fit.last_step = float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+    square, weights = (sum(float(np.ravel(one[i])[0]) for one in found) for i in (2, 4))
+    fit.least_rms = float(np.sqrt(COUNT_VARIANCE * max(square - 2.0 * n @ x + x @ N @ x, 0.0) / max(weights, 1e-9)))
     _move_states(fit, disturbances, x)
+    shorter = max(fit.halvings - 1, 0)  # begin near the length that the last step had in the end
+    x = x * 0.5**shorter
+    for piece, states in zip(fit.pieces, before):
+        piece.states = states + 0.5**shorter * (piece.states - states) if shorter else piece.states
     with np.errstate(over='ignore'):
         moved = np.clip(np.where(sizes, values * np.exp(x), values + fit.scale * x), least, most)
-    old = fit.values
+    fit.moved = Move(fit.values, before, float(fit.cost.sum()), shorter)
     fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
-    fit.moved = Move(old, fit.values, before, fit.pieces, float(fit.cost.sum()))
-    fit.last_step = float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
     return fit.last_step
 
 
-def to_rest(fit: Fit, disturbances: Disturbances, most: int, check: Callable[[], None] = lambda: None) -> None:
-    """Steps until nothing moves, at most so many."""
+def to_rest(fit: Fit, disturbances: Disturbances, most: int, rests: float = CONVERGED) -> None:
+    """Steps until one goes less far than `rests`, at most so many."""
     for _ in range(most):
-        if step(fit, disturbances, check) < CONVERGED:
+        if step(fit, disturbances) < rests:
             break
 
 
-def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | None:
+def linearise_where_better(fit: Fit) -> list[Any] | None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
     Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
     last = fit.moved
-    if last is None or last.after is not fit.values or last.pieces is not fit.pieces:
-        fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
+    if last is None:
+        fit.scale, fit.halvings = linearise(fit.problem, fit.values, fit.pieces), 0
         return None
     found: list[Any] = []
     for halving in range(MOST_HALVINGS + 1):
         try:
-            fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
+            fit.scale = linearise(fit.problem, fit.values, fit.pieces)
             _, found = run_filter(fit, fit.disturbances)
             cost = sum(float(one[2][0]) + one[3] for one in found)
         except ValueError:
             if halving == MOST_HALVINGS:
                 raise
             cost = np.inf
-        if cost <= last.cost + LARGEST_RISE or halving == MOST_HALVINGS:
+        halved = halving if cost == np.inf else last.shorter + halving
+        if cost <= last.cost + LARGEST_RISE or halved >= MOST_HALVINGS or halving == MOST_HALVINGS:
             break
-        fit.values = {key: 0.5 * (last.before[key] + value) for key, value in fit.values.items()}
+        fit.values = {key: value if key == 'u0' else 0.5 * (last.before[key] + value) for key, value in fit.values.items()}
         for piece, states in zip(fit.pieces, last.states):
             piece.states = 0.5 * (piece.states + states)
+    fit.halvings = last.shorter + halving if halving else last.shorter // 2
     return found
 
 

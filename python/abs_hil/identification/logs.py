@@ -44,6 +44,7 @@ class Log:
     read_late_s: how much later than time_s each wheel was read (sample_time_s - time_s)
     first_counts: shape (2,), what the counters held where counts is 0
     experiment: its name; empty if the log does not say it
+    brake_before: for a brake that acts late (brake_flaws.py), the duties that act until late_s after a row's time
     """
     name: str
     path: pathlib.Path
@@ -58,6 +59,8 @@ class Log:
     notes: list[str] = field(default_factory=list)
     first_counts: np.ndarray = field(default_factory=lambda: np.zeros(2))
     experiment: str = ''
+    brake_before: np.ndarray | None = None
+    late_s: float = 0.0
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -67,8 +70,10 @@ class Log:
         return float(np.median(np.diff(self.time_s)))
 
     def inputs(self) -> dict[str, np.ndarray]:
-        return {'time_s': self.time_s, 'brake_pwm': self.brake_pwm, 'motor_pwm': self.motor_pwm,
-                'wheels_apart': self.wheels_apart}
+        inputs = {'time_s': self.time_s, 'brake_pwm': self.brake_pwm, 'motor_pwm': self.motor_pwm,
+                  'wheels_apart': self.wheels_apart}
+        late = {} if self.brake_before is None else {'brake_before': self.brake_before, 'motor_before': self.motor_pwm}
+        return inputs | late
 
 
 def load_log(path: PathLike | Run) -> Log:

@@ -10,6 +10,7 @@ from ..report.tables import Table
 from ..run import stretches
 from .advice import Advice
 from .found import Identified
+from .problem import residuals
 from .results import shown
 
 _FOLDER = pathlib.Path(__file__).parent
@@ -30,6 +31,9 @@ def _parameters(found: Identified) -> Table:
 def _log_figures(found: Identified) -> list[Figure]:
     fit = found.fit
     figures = []
+    left_in: dict[str, list[str]] = {log.name: [] for log in found.logs}
+    for rms, name, phase in residuals(fit):
+        left_in[name].append(f'{phase or "all"} {rms:.3f}')
     for number, log in enumerate(found.logs):
         motion = fit.problem.motions[number]
         speeds = [Curve(0, name, run_style(i), *_thinned(log.time_s, motion.speed_rad_s[:, i]), legend=name, group=name)
@@ -42,22 +46,16 @@ def _log_figures(found: Identified) -> list[Figure]:
         left = np.concatenate([np.empty((0, 2)), *(piece.linear['residual'][:, :, 0] for piece in pieces)])
         left /= fit.problem.radians_per_count
         shown_left = np.where(weight > 0, left, np.nan)
-        residuals = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
+        left_over = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
                      for i, name in enumerate(('upper wheel', 'lower wheel')) if pieces]
         figures.append(Figure(
             f'log-{number + 1}', log.name, Label('time, s', 'time, s'),
             [Panel(Label('speed, rad/s', 'speed, rad/s'), speeds, height_px=150.0),
              Panel(Label('duty', 'duty'), duties, height_px=90.0),
-             Panel(Label('residual, counts', 'residual, counts'), residuals, height_px=110.0)],
-            caption=f'{len(log)} rows; residual by phase: {_by_phase(log.phase[rows], weight, left)}.', axis=f'log-{number + 1}',
+             Panel(Label('residual, counts', 'residual, counts'), left_over, height_px=110.0)],
+            caption=f'{len(log)} rows; residual by phase: {", ".join(left_in[log.name])}.', axis=f'log-{number + 1}',
             shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)]))
     return figures
-
-
-def _by_phase(phases: np.ndarray, weight: np.ndarray, left: np.ndarray) -> str:
-    parts = [(str(phase) or 'all', phases == phase) for phase in dict.fromkeys(phases)]
-    return ', '.join(f'{phase} {np.sqrt(np.average(left[rows]**2, weights=weight[rows])):.3f}' for phase, rows in parts
-                     if weight[rows].any())
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,12 +77,13 @@ def _correlations(found: Identified) -> Table:
 
 def page(found: Identified, advice: list[Advice]) -> str:
     figures = _log_figures(found)
-    validation = Table('validation', ['', 'measured', 'predicted', 'error'], [])
+    validation = Table('validation', ['', 'measured', 'predicted', 'interval', 'error'], [])
     if found.validation is not None:
         v = found.validation
         for name, label in (('stop_distance_m', 'stop distance, m'), ('stop_time_s', 'stop time, s')):
-            error = v[f'{name}_error']
-            validation.rows.append([label, f'{v[name]:.5g}', f'{v[f"predicted_{name}"]:.5g}',
+            measured, predicted, error = (v[name], v[f'predicted_{name}'], v[f'{name}_error'])
+            validation.rows.append([label, f'{measured or np.nan:.5g}', f'{predicted or np.nan:.5g}', '–' if error is None else
+                                    '{:.5g} to {:.5g}'.format(*v[f'{name}_interval']),
                                     '–' if error is None else f'{100 * error:+.3f} %'])
     logs = Table('logs', ['log', 'rows', 's', 'disagreement', 'sha256'],
                  [[log.name, str(len(log)), f'{log.time_s[-1] - log.time_s[0]:.1f}',

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 
-#: the inputs' delay behind the row's time, s; a parameter of logs, not of the plant
+#: the inputs' delay behind the row's time, s; of logs, not of the plant
 DELAY = 'delay_s'
 
 
@@ -55,6 +55,8 @@ _MAKERS = (
     Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop', most=9.0),
     Parameter('mu_a', '1', 'contact', 'slip-sweep', most=9.0, prior=2.0),
     Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
+    Parameter('mu_w1', '1', 'contact', 'locked-stop', floor=0.05, least=-1.0, most=1.0, prior=1.0),
+    Parameter('mu_w3', '1', 'contact', 'locked-stop', floor=0.05, least=-1.0, most=1.0, prior=1.0),
 )
 #: the fastest change of the brake's torque; fitted where the logs show one
 RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop or pulses', least=0.5, most=9e5)
@@ -68,6 +70,8 @@ CURVATURE = Parameter('brake_curvature', '1', 'flaw', '', floor=0.05, least=-0.9
 RELEASE = Parameter('brake_release_ratio', '1', 'brake', '', least=0.1, most=10.0, prior=20.0, none=1.0)
 FRICTION_FALL = Parameter('friction_fall_s_m', 's/m', 'contact', '', floor=1e-3, most=0.05, prior=20.0)
 FLAWS = (FADING, COOLING, HYSTERESIS, DEAD_TIME, CURVATURE, RELEASE, FRICTION_FALL)
+#: all that may join a form's parameters, in this order
+JOINING = {one.key: one for one in (RATE_LIMIT, *FLAWS, Parameter(DELAY, 's', 'always', '', floor=1e-3))}
 WHEELS = ('upper', 'lower')
 
 
@@ -88,7 +92,7 @@ GIVEN = {'J2_kg_m2': 'kg m^2', 'r2_m': 'm'}
 
 @dataclass(frozen=True)
 class Form:
-    """A form of the plant. `road` names the parameters that a factor over the tyre's force multiplies."""
+    """A form of the plant. `road` names the parameters that a factor over the tyre's force multiplies, its height first."""
     name: str
     meaning: str
     settings: Mapping[str, str]
@@ -101,15 +105,15 @@ class Form:
         return tuple(p for p in self.parameters if p not in _SHARED)
 
 
-def _form(tyre: str, load: str, own: tuple[Parameter, ...], road: str) -> Form:
+def _form(tyre: str, load: str, own: tuple[Parameter, ...], *road: str) -> Form:
     meaning = ', '.join(({'magic-formula': 'magic formula', 'inteco-mu': "the maker's curve"}[tyre],
                          {'constant': 'constant load', 'lever': 'load by the lever'}[load]))
-    return Form(tyre, meaning, {'plant.tyre': tyre, 'plant.load': load}, _SHARED + own, (road,))
+    return Form(tyre, meaning, {'plant.tyre': tyre, 'plant.load': load}, _SHARED + own, road)
 
 
 #: all pairs of a tyre and a load
 ALL_FORMS = (_form('magic-formula', 'constant', (_THETA, *_MAGIC), 'theta_N'),
-             _form('inteco-mu', 'lever', (_LEVER, *_MAKERS), 'mu_w4'),
+             _form('inteco-mu', 'lever', (_LEVER, *_MAKERS), 'mu_w4', 'mu_w1', 'mu_w3'),
              _form('magic-formula', 'lever', (_LEVER, _MU_PEAK, *_MAGIC), 'mu_peak'),
              _form('inteco-mu', 'constant', (_THETA, *_MAKERS), 'theta_N'))
 #: by tyre, those that are tried unless the start is one of the others

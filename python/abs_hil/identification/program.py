@@ -1,11 +1,12 @@
-"""The command line of abs_identify, and how far it is: lines for each stage, and on a terminal one changing line with the time
-left."""
+"""The command line of abs_identify, and how far it is: lines for each stage, and on a terminal the time that passed."""
 import argparse
 import contextlib
 import json
+import math
+import pathlib
 import sys
 import time
-from typing import TextIO
+from typing import Any, TextIO
 
 from .. import parsers
 from ..files import make_folder, refuse_existing, write_text, write_whole
@@ -14,15 +15,12 @@ from ..places import Unavailable, misfit
 from ..report.page import plotly_js
 from ..report.text import clean
 from .estimate import identify
-from .found import Identified
-from .results import as_json, as_toml, validate, validating, words
+from .results import as_json, as_toml, speeds_as_json, speeds_as_toml, validate, validating, words
+from .speeds import identify_speeds
+from .traces import load_trace
 
 MISFIT = 1
 INTERRUPTED = 130
-#: words by which a stage's line is known -> what this stage and all after it take, over the time of the first form's first
-#: values. Measured on five logs of the series, of rigs with and without disturbances; the larger one of the two.
-LEFT = (('first values', 4.6), ('left-out logs', 3.8), ('fit', 3.8), ('the rig wanders', 3.1), ('disturbances', 1.8),
-        ('intervals', 0.4), ('what to run next', 0.3))
 DRAW_S = 0.2
 
 
@@ -32,20 +30,11 @@ class Progress:
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._terminal = self._stream.isatty()
-        self._begin = self._stage_begin = time.monotonic()
-        self._drawn = 0.0
-        self._stage = 'logs'
-        self._stages = 0
-        self._unit_s: float | None = None
+        self._begin, self._drawn = time.monotonic(), 0.0
 
     def say(self, text: str) -> None:
-        now = time.monotonic()
         self.clear()
         print(f'abs_identify: {text}', file=self._stream, flush=True)
-        self._stages += 1
-        if self._stages == 2:
-            self._unit_s = now - self._stage_begin
-        self._stage, self._stage_begin = text, now
         self.check()
 
     def check(self) -> None:
@@ -53,20 +42,13 @@ class Progress:
         if not self._terminal or now - self._drawn < DRAW_S:
             return
         self._drawn = now
-        left_s = self.left_s(now)
-        left = f', about {duration(left_s)} left' if left_s > 0.0 else ''
-        self._stream.write(f'\r\x1b[K{duration(now - self._begin)}{left}')
+        self._stream.write(f'\r\x1b[K{duration(now - self._begin)}')
         self._stream.flush()
 
     def end(self) -> None:
         """Nothing more takes time."""
         self.clear()
         self._terminal = False
-
-    def left_s(self, now: float) -> float:
-        """0: not known, or the stage has taken longer than it should have."""
-        share = next((share for words, share in LEFT if words in self._stage), 0.0)
-        return 0.0 if self._unit_s is None else max(0.0, share * self._unit_s - (now - self._stage_begin))
 
     def clear(self) -> None:
         if self._terminal and self._drawn:
@@ -90,22 +72,52 @@ def _fixed(texts: list[str]) -> dict[str, float | None]:
     return fixed
 
 
-def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None:
-    files = {'identified.json': json.dumps(as_json(found), indent=1, allow_nan=False) + '\n'}
-    if not (found.misfit or found.interrupted):
-        files['model.toml'] = as_toml(found)
+def _write(out: pathlib.Path, content: dict[str, Any], model: str, report: str | None) -> None:
+    """identified.json, model.toml unless it is empty, and the page."""
+    files = {'identified.json': json.dumps(content, indent=1, allow_nan=False) + '\n'}
+    if model:
+        files['model.toml'] = model
     else:
-        (o.out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
+        (out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
     if report is not None:
         files['report.html'] = report
     for name, text in files.items():
-        path = o.out / name
+        path = out / name
         write_text(path, text)
         print(path)
 
 
+def _speeds(o: argparse.Namespace, fixed: dict[str, float | None], progress: Progress) -> int:
+    told: list[tuple[str, dict[str, float]]] = [('', {})]  # first what holds for all files
+    for one in o.speeds:
+        if isinstance(one, str):
+            told.append((one, dict(told[0][1])))
+        else:
+            told[-1][1].update([one])
+    try:
+        found = identify_speeds([load_trace(file, keys) for file, keys in told[1:]], o.start, fix=fixed, say=progress.say,
+                                check=progress.check)
+    finally:
+        progress.clear()
+    progress.end()
+    if not found.misfit:
+        print('\n'.join(words(found.parameters)), flush=True)
+    for line in (*(f'{name}: {kind} fitted within {rms:.3g} {unit} RMS' for name, kind, rms, unit in found.left), *found.notes,
+                 *([found.misfit] if found.misfit else [])):
+        progress.say(clean(line, 2000))
+    _write(o.out, speeds_as_json(found), '' if found.misfit else speeds_as_toml(found), None)
+    return MISFIT if found.misfit else 0
+
+
 def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
+    traces = any(isinstance(one, str) for one in o.speeds)
+    if o.speeds and not traces:
+        raise ValueError('--reading goes with --speeds FILE')
+    if bool(o.logs) == traces:
+        raise ValueError('give logs, or coarse traces with --speeds FILE' + (', not both' if traces else ''))
+    if traces and (o.validate or o.drift or o.form != 'auto'):
+        raise ValueError('--validate, --drift and --form go with logs of counts, not with --speeds')
     run = validating(o.validate) if o.validate else None
     make_folder(o.out, '--out')
     for name in ('identified.json', 'model.toml', 'report.html'):
@@ -116,25 +128,31 @@ def _identify(o: argparse.Namespace) -> int:
 
     progress = Progress()
     say = progress.say
+    if traces:
+        return _speeds(o, fixed, progress)
     try:
         found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say, check=progress.check)
     finally:
         progress.clear()
     if run is not None and not (found.interrupted or found.misfit):
         found.validation = validate(found, run)
-        say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
-            f'{found.validation["predicted_stop_distance_m"]:.5g} m')
+        measured, predicted = (found.validation[name] or math.nan for name in ('stop_distance_m', 'predicted_stop_distance_m'))
+        say(f'{o.validate}: stop distance {measured:.5g} m, predicted {predicted:.5g} m')
+        if found.validation['misfit']:
+            found.misfit = f'{found.validation["misfit"]}. So no model.toml is written'
+            found.notes.insert(0, found.misfit)
     report = None
     if not o.no_report and not found.interrupted:
         from .advice import advise
         from .page import page
         say('what to run next')
-        report = page(found, [] if found.misfit else advise(found, progress.check))
+        report = page(found, [] if found.misfit else advise(found))
     progress.end()
-    print('\n'.join(words(found)), flush=True)
+    if not found.refused:
+        print('\n'.join(words({**found.parameters, **found.combinations})), flush=True)
     for note in found.notes:
         say(clean(note, 2000))
-    _write(found, o, report)
+    _write(o.out, as_json(found), '' if found.misfit or found.interrupted else as_toml(found), report)
     return INTERRUPTED if found.interrupted else MISFIT if found.misfit else 0
 
 

@@ -2,10 +2,11 @@
 import datetime
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.signal
 
 from ..core import _core
 from ..options import PathLike, options
@@ -13,56 +14,88 @@ from ..recording import load
 from ..run import Run
 from ..simulation import simulate
 from .found import Estimate, Identified
-from .parameters import DELAY, FORMS, WHEELS
+from .intervals import WIDTH
+from .logs import Log
+from .parameters import DELAY, FORMS, WHEELS, Form
+from .speeds import SpeedsFound
+from .traces import Trace
 
 #: keys of a run's configuration that say what the run did, not on what it ran
 _DOING = ('control.', 'experiment.', 'observer.', 'gate.')
+#: rigs that a prediction's interval comes from; a rig repeats its stop, with other places of the discs, to this share of it; and a
+#: run so many times as far off as the interval reaches is of another rig
+DRAWN = 16
+REPEATS = 5e-3
+CLEARLY = 2.0
+#: a factor that wanders holds for so long, and a run lasts so long at most
+WANDER_S = 0.1
+LONGEST_S = 40.0
 #: a run's gate.* belongs to its board where it names board limits
 _LEFT_OUT = ('gate.brake_duty_max', 'gate.motor_duty_max')
 #: of a form with the maker's curve or lever, what no log tells
-_OF_THE_START = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
+_OF_THE_START = ('mu_w2', 'lever_L_m', 'lever_phi_deg')
+
+
+def _json(found: Identified | SpeedsFound, parameters: Mapping[str, Estimate], form: str, **more: Any) -> dict[str, Any]:
+    rows = {name: {'value': e.value, 'low': e.low, 'high': e.high, 'status': e.status} for name, e in parameters.items()}
+    return {'parameters': rows, 'form': form, 'start': found.start, **more, 'misfit': found.misfit or None, 'notes': found.notes,
+            'version': _core.version, 'date': datetime.date.today().isoformat()}
 
 
 def as_json(found: Identified) -> dict[str, Any]:
-    def row(estimate: Estimate) -> dict[str, Any]:
-        return {'value': estimate.value, 'low': estimate.low, 'high': estimate.high, 'status': estimate.status}
-    return {'parameters': {name: row(e) for name, e in {**found.parameters, **found.combinations}.items()},
-            'residual_counts_rms': found.residual_counts_rms,
-            'form': 'undecided' if found.undecided else found.form,
-            'start': found.start,
-            'disturbances': None if found.disturbances is None else {
-                'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
-            'logs': [{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
-                      'duration_s': float(log.time_s[-1] - log.time_s[0]),
-                      'disagreement': found.disagreement.get(log.name)} for log in found.logs],
-            'misfit': found.misfit or None,
-            'notes': found.notes,
-            'validation': found.validation,
-            'version': _core.version,
-            'date': datetime.date.today().isoformat()}
+    told = {name: e for name, e in {**found.parameters, **found.combinations}.items() if not found.refused or e.status == 'fixed'}
+    return _json(found, told, 'undecided' if found.undecided else found.form,
+                 residual_counts_rms=found.residual_counts_rms, validation=found.validation,
+                 disturbances=None if found.disturbances is None else {
+                     'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
+                 logs=[{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
+                        'duration_s': float(log.time_s[-1] - log.time_s[0]),
+                        'disagreement': found.disagreement.get(log.name)} for log in found.logs])
+
+
+def speeds_as_json(found: SpeedsFound) -> dict[str, Any]:
+    return _json(found, {} if found.misfit else found.parameters, found.form.name, traces=[
+        {'name': trace.name, 'path': str(trace.path), 'sha256': trace.sha256, 'readings': trace.keys,
+         'left': [{'channel': kind, 'rms': rms, 'unit': unit} for name, kind, rms, unit in found.left if name == trace.name]}
+        for trace in found.traces])
+
+
+def speeds_as_toml(found: SpeedsFound) -> str:
+    """As `as_toml`. What is not estimated is the start's."""
+    plant = []
+    for key, value in _core.PlantOptions(options(plant=found.start)).values().items():
+        text = _number(found.plant.get(key, value)) if isinstance(value, float) else json.dumps(value)
+        plant.append(_line(key, found.parameters[key]) if key in found.parameters else f'{key} = {text}')
+    tyre = {} if found.form is FORMS['magic-formula'] else equivalent_tyre(found.base, found.plant)
+    return _file(f'all else is that of the start, {_comment(found.start)}', found.traces, found.notes, found.form, plant,
+                 [f'{key} = {_number(value)}' for key, value in tyre.items()])
 
 
 def as_toml(found: Identified) -> str:
     """The content of model.toml: a plant's file, which --model and --plant load."""
-    def line(key: str, e: Estimate) -> str:
-        return f'{key} = {_number(e.value)}  # {e.unit}: ' + ', '.join(filter(None, (e.status, shown(e)[1])))
-
     form = found.fit.problem.form
     base = found.fit.problem.base.values()
-    lines = [f'# Identified by abs_identify {_core.version} on {datetime.date.today().isoformat()}: value, then status and '
-             'interval of 95 %.',
-             f'# Residual {found.residual_counts_rms:.4f} counts RMS (0.2887 if nothing but the counts disturbs).']
-    lines += [f'# Log {_comment(log.name)}: sha256 {log.sha256}' for log in found.logs]
-    lines += [f'# {_comment(note)}' for note in found.notes]
-    description = f'identified from {len(found.logs)} logs on {datetime.date.today().isoformat()}: {form.meaning}'
-    lines += ['', f'description = {json.dumps(description)}', f'identified = {datetime.date.today().isoformat()}', '', '[plant]',
-              *(f'{key.removeprefix("plant.")} = "{value}"' for key, value in form.settings.items())]
-    lines += [line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
-    lines.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')
-    if found.fit.problem.form is not FORMS['magic-formula']:
-        lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in _OF_THE_START]
-    believed = _believed(found)
-    return '\n'.join([*lines, *(['', '[model]', *believed] if believed else [])]) + '\n'
+    plant = [f'{key.removeprefix("plant.")} = "{value}"' for key, value in form.settings.items()]
+    plant += [_line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
+    plant.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')
+    if form is not FORMS['magic-formula']:
+        plant += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in _OF_THE_START]
+    return _file(f'residual {found.residual_counts_rms:.4f} counts RMS (0.2887 if nothing but the counts disturbs)', found.logs,
+                 found.notes, form, plant, _believed(found))
+
+
+def _line(key: str, e: Estimate) -> str:
+    return f'{key} = {_number(e.value)}  # {e.unit}: ' + ', '.join(filter(None, (e.status, shown(e)[1])))
+
+
+def _file(about: str, sources: Sequence[Log] | Sequence[Trace], notes: list[str], form: Form, plant: list[str],
+          model: list[str]) -> str:
+    today = datetime.date.today().isoformat()
+    lines = [f'# Identified by abs_identify {_core.version} on {today}: value, then status and interval of 95 %;', f'# {about}.',
+             *(f'# {_comment(one.name)}: sha256 {one.sha256}' for one in sources), *(f'# {_comment(note)}' for note in notes), '',
+             f'description = {json.dumps(f"identified from {len(sources)} records on {today}: {form.meaning}")}',
+             f'identified = {today}', '', '[plant]', *plant, *(['', '[model]', *model] if model else [])]
+    return '\n'.join(lines) + '\n'
 
 
 def _believed(found: Identified) -> list[str]:
@@ -135,7 +168,9 @@ def validating(folder: PathLike) -> Run:
 
 def validate(found: Identified, run: Run) -> dict[str, Any]:
     """Simulates a run of `validating` on the identified plant, with its own controller and model, and compares where and when
-    both stop."""
+    both stop. The predictions' intervals come from rigs drawn from the estimates, which wander as the logs' rig does.
+
+    A run that lies clearly outside of its interval is of another rig or state: `misfit` then says so."""
     config = run.config
     settings = {key: value for key, value in config.items() if key.startswith(_DOING) and key not in _LEFT_OUT}
     known = {row['name'] for row in _core.keys(options())}
@@ -143,15 +178,46 @@ def validate(found: Identified, run: Run) -> dict[str, Any]:
         settings.update({f'model.{key.removeprefix(part)}': value for key, value in config.items() if key.startswith(part)})
     settings.update(plant_settings(found))
     settings = {key: value for key, value in settings.items() if value is not None and key in known}
-    predicted = simulate(controller=str(run.summary.get('controller', 'adaptive')),
-                         experiment=str(run.summary.get('experiment', 'paper')), set=settings)
+    random = np.random.default_rng(1)
+
+    def stop(more: Mapping[str, Any]) -> dict[str, Any]:
+        return simulate(controller=str(run.summary.get('controller', 'adaptive')),
+                        experiment=str(run.summary.get('experiment', 'paper')), set={**settings, **more}).summary
+    predicted, drawn = stop({}), [stop(_drawn(found, random)) for _ in range(DRAWN)]
     out: dict[str, Any] = {'run': str(run.folder)}
-    for name in ('stop_distance_m', 'stop_time_s'):
-        measured, simulated = run.summary.get(name), predicted.summary.get(name)
-        out[name] = measured
-        out[f'predicted_{name}'] = simulated
-        out[f'{name}_error'] = simulated / measured - 1 if measured and simulated is not None else None
+    apart = []
+    for name, unit in (('stop_distance_m', 'm'), ('stop_time_s', 's')):
+        measured, simulated = run.summary.get(name), predicted.get(name)
+        others = [one[name] for one in drawn if one.get(name) is not None]
+        out[name], out[f'predicted_{name}'], out[f'{name}_error'], out[f'{name}_interval'] = measured, simulated, None, None
+        if measured and simulated is not None and others:
+            reach = WIDTH * float(np.hypot(np.std([*others, simulated]), REPEATS * simulated))
+            out[f'{name}_error'], out[f'{name}_interval'] = simulated / measured - 1, [simulated - reach, simulated + reach]
+            if abs(measured - simulated) > CLEARLY * reach:
+                apart.append(f'{name} is {measured:.4g} {unit}, predicted {simulated:.4g} ({simulated - reach:.4g} to '
+                             f'{simulated + reach:.4g})')
+        elif measured:
+            apart.append(f'{name} is {measured:.4g} {unit}, and the identified plant does not stop')
+    out['misfit'] = (f'"{run.folder}" is of another rig, or of another state of this one: {" and ".join(apart)}' if apart else '')
     return out
+
+
+def _drawn(found: Identified, random: np.random.Generator) -> dict[str, Any]:
+    """--set for a rig of the estimates' distribution, whose friction, brake and motor wander as the fit found it."""
+    fit = found.fit
+    x = random.multivariate_normal(np.zeros(len(fit.scale)), found.spread.covariance, check_valid='ignore')
+    values = {p.key: float(np.clip(fit.values[p.key] + scale * at, p.least, p.most))
+              for p, scale, at in zip(fit.problem.parameters, fit.scale, x)}
+    settings: dict[str, Any] = {f'plant.{key}': values[key] for key in found.parameters if key in values and key != DELAY
+                                and not key.startswith('brake_factor')}
+    if found.disturbances is not None:
+        keeps = np.exp(-WANDER_S / found.disturbances.time_constant_s[0])
+        for name, sd in zip(('friction', 'brake_torque', 'motor_torque'), found.disturbances.sd):
+            noise = np.sqrt(1.0 - keeps**2) * random.standard_normal(int(LONGEST_S / WANDER_S))
+            factors = 1.0 + sd * scipy.signal.lfilter([1.0], [1.0, -keeps], noise)
+            settings[f'plant.{name}_profile'] = 'time: 1; ' + '; '.join(
+                f'{factor:.6f} from {i * WANDER_S:g} to {(i + 1) * WANDER_S:g}' for i, factor in enumerate(factors))
+    return settings
 
 
 def shown(e: Estimate) -> tuple[str, str]:
@@ -162,8 +228,7 @@ def shown(e: Estimate) -> tuple[str, str]:
     return f'{e.value:.{digits}g}', f'{e.low:.{digits}g} to {e.high:.{digits}g}'
 
 
-def words(found: Identified) -> list[str]:
-    rows: Mapping[str, Estimate] = {**found.parameters, **found.combinations}
+def words(rows: Mapping[str, Estimate]) -> list[str]:
     width = max(len(name) for name in rows)
     return ['{:{}}  {:14}  {:34}  {}'.format(name, width, *shown(e), e.status) for name, e in rows.items()
             if name != DELAY or e.value != 0.0]

@@ -4,11 +4,14 @@ With F eliminated from (1) and (2), over an interval of time,
 
     (J1/r1) dw1 + (J2/r2) dw2 = int [ Tm/r2 - (d1 w1 + M10 s1 + Tb)/r1 - (d2 w2 + M20)/r2 ] dt
 
-which is linear but for u0 and c31; these two are scanned. While the wheels are apart, each has an equation of its own.
-The tyre's parameters then fit the force that the lower wheel felt.
+with inertias J (kg m^2), radii r (m), speeds w (rad/s), bearings d (N m s/rad) and M (N m), s = 0 where a wheel stands, motor and
+brake torques Tm and Tb (N m). It is linear but for u0, c31 and the brake's dead time. While the wheels are apart, each has an
+equation of its own. The stages follow each other, and each begins with what the last one knows and how well: bearings from
+wheels that turn freely, the motor, and the brake, whose u0, c31 and dead time are scanned. The tyre's parameters then fit the
+force that the lower wheel felt. What no log tells keeps the start's value.
 """
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +19,26 @@ import scipy.optimize
 import scipy.signal
 
 from ..core import _core
-from .brake_flaws import brake_torques
+from .brake_flaws import brake_torques, with_flaws
 from .logs import Log
+from .parameters import DEAD_TIME
 from .problem import Problem
 
 INTERVAL_S = 0.04
 COARSE_S = 0.004
 #: of the brake's line, as a share of the start's: a brake with less did not act
 LEAST_SLOPE = 0.05
+#: a dead time is believed at first if it takes this share off the cost without one; less is found later
+WORTH_DEAD = 0.3
+LARGEST_DEAD_S = 0.04
+#: of the start's values, over their size
+START_SD = 0.5
+#: the speeds' errors stand in the columns, too, and draw towards 0 what little else tells: the rows count for less by this factor
+DOUBT = 10.0
+#: after a braking, so long a wheel rolls freely, s
+RESTS_S = 0.3
+#: the tyre's parameters are within a factor of exp of this
+FARTHEST = 4.6
 
 
 @dataclass
@@ -60,28 +75,24 @@ def _pieces(problem: Problem) -> _Pieces:
     return _Pieces(parts, *(np.concatenate(column) for column in zip(*columns)))
 
 
-def first_values(problem: Problem, start: Mapping[str, float],
-                 other_form: Mapping[str, float] | None = None) -> dict[str, float]:
-    """First values of the form's parameters. `start` fills what the logs do not tell; `other_form`: first values of another
-    form, from the same logs: all but the tyre's hold here, too."""
+def first_values(problem: Problem, start: Mapping[str, float], other_form: Mapping[str, float] | None = None,
+                 worth_dead: float = WORTH_DEAD) -> dict[str, float]:
+    """First values of the form's parameters, and of the brake's dead time if it takes the share `worth_dead` off the cost. `start`
+    fills what the logs do not tell; `other_form`: first values of another form, from the same logs: all but the tyre's hold
+    here, too."""
     pieces = _pieces(problem)
-    value = {p.key: float(start[p.key]) for p in problem.form.parameters}
-    value.update(problem.fixed)
-    if other_form is not None:
-        value.update({key: number for key, number in other_form.items() if key in value})
-        _tyre(value, pieces, problem)
-        return value
-    if 'r1_m' not in problem.fixed:
+    value = {p.key: float(start[p.key]) for p in problem.form.parameters} | problem.fixed
+    if other_form is None:
         rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
-        for rest_s in (1.0, 0.3):  # after a locked wheel, rolling takes its time
+        for rest_s in (1.0, RESTS_S):  # after a locked wheel, rolling takes its time
             rolling = rolls & ~_braked(pieces, problem.logs, rest_s)
-            if rolling.sum() > 3:
+            if rolling.sum() > 3 and 'r1_m' not in problem.fixed:
                 value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
-    _scan_brake(value, pieces, problem)
-    for p in problem.form.parameters:
-        if p.key not in problem.fixed:
-            value[p.key] = float(np.clip(value[p.key], p.least, p.most))
+        value.update(_scanned_brake(value, pieces, problem, worth_dead))
+        value.update({p.key: float(np.clip(value[p.key], p.least, p.most)) for p in problem.form.parameters} | problem.fixed)
+    else:
+        value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
     _tyre(value, pieces, problem)
     return value
 
@@ -94,35 +105,39 @@ def _braked(pieces: _Pieces, logs: Sequence[Log], rest_s: float) -> np.ndarray:
         memory = max(1, round(rest_s / log.period_s))
         recent = _integral(log, (log.brake_pwm > 0).astype(float))
         acts.append(recent[last] - recent[np.maximum(first - memory, 0)] > 0)
-    return np.concatenate(acts) if acts else np.empty(0, dtype=bool)
+    return np.concatenate(acts)
 
 
 #: columns of the linear fit
-_LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm',
-           'b2_Nm')
+_LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm', 'b2_Nm')
+#: cost, linear values, u0, c31, dead time
+_Scanned = tuple[float, np.ndarray, float, float, float]
 #: the least sizes of those that may be 0
 _FLOORS = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
 
 
-def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
+def _scanned_brake(value: Mapping[str, float], pieces: _Pieces, problem: Problem, worth_dead: float) -> dict[str, float]:
+    """Bearings, motor and brake: the linear ones at the likeliest u0, c31 and dead time."""
     logs, fixed = problem.logs, problem.fixed
     r1, r2, J2 = value['r1_m'], problem.given['r2_m'], problem.given['J2_kg_m2']
     zero = np.zeros(len(pieces.duration))
     turning1, turning2 = pieces.turning.T
     motor = {'motor_stall_torque_Nm': pieces.motor, 'back_emf': -pieces.motor_speed}
     contact, apart = ~pieces.apart, pieces.apart
-    duties = np.unique(np.concatenate([log.brake_pwm[log.brake_pwm > 0] for log in logs] or [np.empty(0)]))
+    duties = problem.duties[problem.duties > 0.0]
 
     # The scan needs no more than every fourth millisecond.
     thin = [max(1, round(COARSE_S / log.period_s)) for log in logs]
     coarse = [(0.5 * np.diff(log.time_s[::k]), log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
               for log, motion, k in zip(logs, problem.motions, thin)]
 
-    def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
+    def brake_columns(u0: float, c31: float, dead_s: float) -> tuple[np.ndarray, np.ndarray]:
         slopes: list[np.ndarray] = []
         offsets: list[np.ndarray] = []
         for number, first, last in pieces.parts:
             half_s, duty, turning, k = coarse[number]
+            if late := round(dead_s / (k * logs[number].period_s)):
+                duty = np.concatenate([np.zeros(late), duty[:-late]])
             active = (duty >= u0) & (duty > 0)
             keeps = float(np.exp(-c31 * k * logs[number].period_s))
             for into, static in ((slopes, np.where(active, duty, 0.0)), (offsets, active.astype(float))):
@@ -140,79 +155,85 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, problem: Problem) -> N
     friction1 = {'d1_Nms_rad': pieces.angle[:, 0], 'M10_Nm': turning1, 'J1_kg_m2': pieces.dw[:, 0]}
     friction2 = {'d2_Nms_rad': pieces.angle[:, 1], 'M20_Nm': turning2, **{k: -v for k, v in motor.items()}}
     parts = ((usable, r2 / r1, 1.0), (upper, 1.0, 0.0), (lower, 0.0, 1.0))
+    of_row = np.concatenate([np.flatnonzero(rows) for rows, _, _ in parts])
     unbraked = np.concatenate([np.stack([upper_by * friction1.get(key, zero) + lower_by * friction2.get(key, zero)
                                          for key in _LINEAR], axis=1)[rows] for rows, upper_by, lower_by in parts])
     target = np.concatenate([-lower_by * J2 * pieces.dw[rows, 1] for rows, _, lower_by in parts])
+    brakes = np.concatenate([upper_by * np.ones(rows.sum()) for rows, upper_by, _ in parts])
+    driven, braked = pieces.motor[of_row] > 0.0, _braked(pieces, logs, RESTS_S)[of_row]
 
-    # What the logs do not tell stays near the start: a weak pull, in the size of each parameter.
+    # What the logs do not tell stays near the start: that is as good as a reading of each parameter.
     emf = value['motor_stall_torque_Nm'] / value['motor_no_load_speed_rad_s']
     guess = np.array([{**value, 'back_emf': emf}[key] for key in _LINEAR])
     free = [i for i, key in enumerate(_LINEAR) if key not in fixed]
     sizes = np.maximum(np.abs(guess), [_FLOORS.get(key, 1e-6) for key in _LINEAR])[free]
-    pull = 0.02 * np.median(np.abs(pieces.duration)) / (5.0 * sizes)
+    pull = np.diag(1.0 / (START_SD * sizes))
+    pulls_to = pull @ guess[free]
+    target = target - np.delete(unbraked, free, axis=1) @ np.delete(guess, free)  # the brake's columns are still 0
+    for rows in (~driven & ~braked, driven & ~braked):
+        if rows.any():
+            pull, pulls_to = _robust(unbraked[rows][:, free], target[rows], pull, pulls_to)[2:]
 
-    def fit(u0: float, c31: float) -> tuple[float, np.ndarray]:
-        A, y = unbraked.copy(), target
-        for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31)):
-            A[:, _LINEAR.index(key)] = np.concatenate([upper_by * column[rows] for rows, upper_by, _ in parts])
-        for i in sorted({*range(len(_LINEAR))} - {*free}):
-            y = y - A[:, i] * guess[i]
+    def fit(u0: float, c31: float, dead_s: float) -> tuple[float, np.ndarray]:
+        A, y = unbraked[braked], target[braked]
+        for key, column in zip(('b1_Nm', 'b2_Nm'), brake_columns(u0, c31, dead_s)):
+            A[:, _LINEAR.index(key)] = (brakes * column[of_row])[braked]
+            y = y - A[:, _LINEAR.index(key)] * fixed.get(key, 0.0)
         full = guess.copy()
-        full[free], cost = _robust(A[:, free], y, np.diag(pull), pull * guess[free])
+        full[free], cost, *_ = _robust(A[:, free], y, pull, pulls_to)
         return cost, full
 
-    u0s, c31s = [value['u0']], [value['c31_per_s']]
-    best = np.inf, guess, value['u0'], value['c31_per_s']
-    if 'c31_per_s' not in fixed and len(duties):
-        c31s = list(np.geomspace(4.0, 100.0, 12))
-    if 'u0' not in fixed and len(duties):
-        u0s = sorted({float(u) for u in np.quantile(duties, np.linspace(0, 1, 24))} | {float(duties[0])})
-    for round_number in range(3):
-        for u0, c31 in itertools.product(u0s, c31s):
-            cost, found = fit(u0, c31)
-            if cost < best[0]:
-                best = cost, found, u0, c31
-        if len(c31s) > 1:
-            c31s = list(best[3] * np.geomspace(*((0.93, 1.07) if round_number else (0.8, 1.25)), 5))
-        if len(u0s) > 1:
-            width = (duties[-1] - duties[0]) / 24 / (4 ** round_number)
-            near = duties[(duties > best[2] - width) & (duties < best[2] + width)]
-            u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
-    linear = dict(zip(_LINEAR, best[1]))
-    # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
-    brakes = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
-    for key in _LINEAR:
-        if key in value and key not in fixed and (brakes or key not in ('b1_Nm', 'b2_Nm')):
-            value[key] = float(linear[key])
+    def scan(best: _Scanned, u0s: Iterable[float], c31s: Iterable[float], deads_s: Iterable[float] = (0.0,)) -> _Scanned:
+        u0s, c31s = ([value[key]] if key in fixed else some for key, some in (('u0', u0s), ('c31_per_s', c31s)))
+        return min([best, *((*fit(*one), *one) for one in itertools.product(u0s, c31s, deads_s))], key=lambda one: one[0])
+
+    def near(u0: float, width: float) -> list[float]:
+        some = duties[np.abs(duties - u0) < width]
+        return sorted({*np.quantile(some, np.linspace(0, 1, 6)).tolist(), u0}) if some.size else [u0]
+
+    best = *fit(value['u0'], value['c31_per_s'], 0.0), value['u0'], value['c31_per_s'], 0.0
+    if duties.size:
+        span = float(np.ptp(duties)) / 24
+        best = scan(best, sorted({*np.quantile(duties, np.linspace(0, 1, 24)).tolist()}), np.geomspace(4.0, 400.0, 16))
+        for width, factor in ((span, 1.25), (span / 4, 1.08)):
+            best = scan(best, near(best[2], width), best[3] * np.geomspace(1.0 / factor, factor, 5))
+        late = scan(best, [best[2]], np.geomspace(8.0, 600.0, 8), np.arange(COARSE_S, LARGEST_DEAD_S, COARSE_S))
+        if late[0] < (1.0 - worth_dead) * best[0]:
+            best = scan(late, near(late[2], span), late[3] * np.geomspace(0.7, 1.4, 5), late[4] + COARSE_S * np.arange(-1, 2))
+    linear = dict(zip(_LINEAR, best[1].tolist()))
+    found = {key: linear[key] for key in _LINEAR if key in value}
     for key, floor in _FLOORS.items():
-        if key not in fixed:
-            value[key] = max(value[key], 0.1 * max(abs(value[key]), floor))
-    if 'J1_kg_m2' not in fixed:
-        value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
-    if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
-        value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / linear['back_emf'], 20, 2000))
-    if 'u0' not in fixed and brakes:
-        value['u0'] = best[2]
-    if 'c31_per_s' not in fixed and brakes:
-        value['c31_per_s'] = best[3]
+        found[key] = max(found[key], 0.1 * max(abs(found[key]), floor))
+    if pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
+        stall = problem.fixed.get('motor_stall_torque_Nm', found['motor_stall_torque_Nm'])
+        found['motor_no_load_speed_rad_s'] = float(np.clip(stall / linear['back_emf'], 20, 2000))
+    found.update(u0=float(best[2]), c31_per_s=float(best[3]))
+    if best[4] > 0.0 > linear['b2_Nm']:
+        found[DEAD_TIME.key] = float(best[4])
+    if linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']:
+        return found
+    # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
+    return {key: number for key, number in found.items() if key not in ('b1_Nm', 'b2_Nm', 'u0', 'c31_per_s')}
 
 
-def _robust(A: np.ndarray, y: np.ndarray, A_pull: np.ndarray, y_pull: np.ndarray) -> tuple[np.ndarray, float]:
-    """Least squares that forgives outliers (Huber's weights); the cost is robust too."""
-    weight = np.ones(len(y))
-    found = np.zeros(A.shape[1])
-    scale = 1.0
-    for _ in range(4):
-        root = np.sqrt(weight)[:, None]
-        stacked, target = np.concatenate([A * root, A_pull]), np.concatenate([y * root[:, 0], y_pull])
+def _robust(A: np.ndarray, y: np.ndarray, pull: np.ndarray,
+            pulls_to: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+    """Least squares that forgives outliers (Huber's weights), with rows of unit variance that others left, pull x = pulls_to; the
+    cost is robust too. The last two are such rows for the next."""
+    found = np.linalg.solve(pull, pulls_to)
+    for number in range(5):
+        residual = np.abs(y - A @ found)
+        scale = 1.0
+        if len(y):
+            scale = 1e-12 + float(1.4826 * np.median(residual) if number else np.sqrt(np.mean(residual**2)))
+        root = np.sqrt(np.minimum(1.0, 2.0 * scale / np.maximum(residual, 1e-15))) / (DOUBT * scale)
+        stacked, target = np.concatenate([A * root[:, None], pull]), np.concatenate([y * root, pulls_to])
         size = np.linalg.norm(stacked, axis=0)
         size[size == 0] = 1.0
         found = np.linalg.lstsq(stacked / size, target, rcond=None)[0] / size
-        residual = y - A @ found
-        scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
-        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(residual), 1e-15))
-    limit = 0.02
-    return found, float(np.sum(np.minimum(residual**2, limit * np.abs(residual))))
+    residual, limit = np.abs(y - A @ found), 0.02
+    left, triangle = np.linalg.qr(stacked)
+    return found, float(np.sum(np.minimum(residual**2, limit * residual))), triangle, left.T @ target
 
 
 def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
@@ -227,31 +248,27 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
              - value['M20_Nm'] * pieces.turning[:, 1]) / (r2 * pieces.duration)
     middles = []
     for number, first, last in pieces.parts:
-        motion = problem.motions[number]
-        at_rows = np.column_stack([np.where(motion.stands, 0.0, motion.speed_rad_s), brake_torques(problem.logs[number], value)])
-        middles.append(at_rows[(first + last) // 2])
+        log, motion = problem.logs[number], problem.motions[number]
+        torque = brake_torques(*with_flaws(log, motion, value))
+        middles.append(np.column_stack([np.where(motion.stands, 0.0, motion.speed_rad_s), torque])[(first + last) // 2])
     w1, w2, Tb = np.concatenate(middles)[contact].T
     force = force[contact]
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
-    lows = np.array([max(p.least, 1e-2 * value[p.key]) for p in tyre])
-    highs = np.array([min(p.most, 1e2 * value[p.key]) for p in tyre])
-    x_start = np.log([value[p.key] for p in tyre])
+    keys, least, most = zip(*((p.key, p.least, p.most) for p in tyre))
+    begun = np.array([value[key] for key in keys])
+    line = np.less(least, 0.0)  # those that may be negative move along a straight line, the others by factors
+
+    def from_x(x: np.ndarray) -> list[float]:
+        return np.clip(np.where(line, begun + 0.1 * x, begun * np.exp(np.where(line, 0.0, x))), least, most).tolist()
 
     def residual(x: np.ndarray) -> np.ndarray:
-        values = np.clip(np.exp(x), lows, highs)
         try:
-            modelled = _core.tyre_forces_N(base, shared + list(zip([p.key for p in tyre], values.tolist())), w1, w2, Tb)
+            modelled = _core.tyre_forces_N(base, shared + list(zip(keys, from_x(x))), w1, w2, Tb)
         except ValueError:  # this friction would wedge the lever
             return np.full(len(force) + len(x), 100.0)
         # What the force does not tell, as the peak's height in gentle braking, stays near the start.
-        return np.concatenate([np.asarray(modelled) - force, 2.0 * (x - x_start)])
-
-    fits = []
-    for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes
-        x0 = np.log([np.clip(value[p.key] * (factor if p.key in form.road else 1.0), 1.05 * low, 0.9 * high)
-                     for p, low, high in zip(tyre, lows, highs)])
-        fits.append(scipy.optimize.least_squares(residual, x0, bounds=(np.log(lows), np.log(highs)), loss='soft_l1',
-                                                 f_scale=1.0, max_nfev=60))
-    best = min(fits, key=lambda fit: fit.cost)
-    for p, number in zip(tyre, np.clip(np.exp(best.x), lows, highs)):
-        value[p.key] = float(number)
+        return np.concatenate([np.asarray(modelled) - force, 2.0 * x])
+    heights = np.isin(keys, form.road) & ~line  # their starts decide the side of the peak that a fit takes
+    best = min((scipy.optimize.least_squares(residual, heights * np.log(factor), bounds=(-FARTHEST, FARTHEST), loss='soft_l1',
+                                             max_nfev=60) for factor in (1.0, 0.6, 1.6)), key=lambda fit: float(fit.cost))
+    value.update(zip(keys, from_x(best.x)))

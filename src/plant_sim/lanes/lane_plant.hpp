@@ -14,24 +14,19 @@
   each(plant_sim::BasicMagicFormula, plant_sim::BasicConstantLoad) \
       each(plant_sim::BasicIntecoMu, plant_sim::BasicLeverLoad)
 
-/// Plants of other parameters or states that pass the same inputs side by side: what differences of simulations are
-/// made of. Compiled for each instruction set, as the lanes of a study are.
+/// Plants of other parameters, states or duties that pass the same window side by side: what differences of simulations
+/// are made of. Compiled for each instruction set, as the lanes of a study are.
 namespace abs_hil::plant_sim::lanes {
 
-/// Inputs over one interval. A lane whose inputs come late has the earlier ones until then.
-struct Interval {
-  double duration_s{0.0};
-  double motor_duty{0.0};
-  double brake_duty{0.0};
-  double earlier_motor_duty{0.0};
-  double earlier_brake_duty{0.0};
-};
+/// The duties of one interval, a vector of lanes each. A lane whose inputs come late has the earlier ones until then.
+enum Duty : std::size_t { motor_duty, brake_duty, earlier_motor_duty, earlier_brake_duty, duties };
 
 /// One window and the plants that pass it. Lane n has column n of every array; each array has `lanes` columns.
 struct WindowWork {
-  double* const* plants{nullptr};  ///< words of a LanePlant<double>, at its start state; they stay as they are
-  std::size_t count{0};            ///< of plants: `lanes` at most
-  const Interval* intervals{nullptr};
+  double* const* plants{nullptr};      ///< words of a LanePlant<double>, at its start state; they stay as they are
+  std::size_t count{0};                ///< of plants: `lanes` at most
+  const double* durations_s{nullptr};  ///< (rows)
+  const double* inputs{nullptr};       ///< (rows, duties, lanes)
   std::size_t rows{0};
   bool apart{false};        ///< the wheels do not touch
   bool late{false};         ///< a lane's inputs come late
@@ -94,24 +89,25 @@ class WindowPass {
   explicit WindowPass(const Plant& plant) noexcept : plant_(plant) {}
 
   /// Over one interval. True where a wheel stands or stops.
-  [[gnu::always_inline]] auto advance(const Interval& interval, bool apart, bool late) noexcept {
-    const S whole_s(interval.duration_s);
-    if (!late) return advance_part(whole_s, interval.motor_duty, interval.brake_duty, apart);
+  [[gnu::always_inline]] auto advance(double duration_s, const S* duty, bool apart, bool late) noexcept {
+    const S whole_s(duration_s);
+    const auto same = duty[earlier_motor_duty] == duty[motor_duty] && duty[earlier_brake_duty] == duty[brake_duty];
+    if (!late || !rig::any(!same)) return advance_part(whole_s, duty[motor_duty], duty[brake_duty], apart);
     const S late_s = rig::smaller(plant_.delay_s, whole_s);
-    const auto before = advance_part(late_s, interval.earlier_motor_duty, interval.earlier_brake_duty, apart);
-    return before || advance_part(S(whole_s - late_s), interval.motor_duty, interval.brake_duty, apart);
+    const auto before = advance_part(late_s, duty[earlier_motor_duty], duty[earlier_brake_duty], apart);
+    return before || advance_part(S(whole_s - late_s), duty[motor_duty], duty[brake_duty], apart);
   }
   [[nodiscard]] const BasicState<S>& x() const noexcept { return plant_.x; }
 
  private:
-  [[gnu::noinline, gnu::flatten]] auto advance_part(const S& duration_s, double motor_duty, double brake_duty,
+  [[gnu::noinline, gnu::flatten]] auto advance_part(const S& duration_s, const S& motor, const S& brake,
                                                     bool apart) noexcept {
     BasicHeldTorques<S> held;
-    held.brake_target_Nm = rig::brake_torque_at(plant_.brake, S(brake_duty));
+    held.brake_target_Nm = rig::brake_torque_at(plant_.brake, brake);
     held.brake_rate_per_s = plant_.brake.c31_per_s * rig::select(held.brake_target_Nm < plant_.x[brake_torque],
                                                                  plant_.brake_release_ratio, S(1.0));
     held.brake_limit_Nm_s = plant_.brake_limit_Nm_s;
-    held.motor_stall_Nm = plant_.motor_stall_Nm * S(motor_duty);
+    held.motor_stall_Nm = plant_.motor_stall_Nm * motor;
     held.motor_back_emf_Nms = held.motor_stall_Nm / plant_.motor_no_load_rad_s;
     if (apart) {
       const ApartBalance<S> balance{plant_.wheels, held, plant_.upper_turns};
@@ -155,7 +151,9 @@ bool pass_window(const WindowWork& work) noexcept {
     double* const to = work.angles + 2 * row * S::lanes;
     std::memcpy(to, &pass.x()[angle1], bytes);
     std::memcpy(to + S::lanes, &pass.x()[angle2], bytes);
-    if (rig::any(pass.advance(work.intervals[row], work.apart, work.late))) return false;
+    S duty[duties];
+    std::memcpy(duty, work.inputs + row * duties * S::lanes, sizeof duty);
+    if (rig::any(pass.advance(work.durations_s[row], duty, work.apart, work.late))) return false;
   }
   for (std::size_t i = 0; i < pass.x().size(); ++i) std::memcpy(work.ends + i * S::lanes, &pass.x()[i], bytes);
   return true;
