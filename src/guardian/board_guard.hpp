@@ -49,7 +49,8 @@ struct GuardParts {
 ///
 ///     keep     no run is covered: the outputs are looked at every `keep_ns` and kept at zero, from the start to the
 ///              end, before a run is covered, between two runs of a lease, and after it
-///     watch    a run is covered: its heartbeat is looked at eight times in its timeout; the board is the run's
+///     watch    a run is covered: its heartbeat is looked at eight times in its timeout; the board is the run's from
+///              its first cycle on, and until then it is looked at as in `keep`
 ///     act      a run died, fell silent, or must give the outputs back: it is ended if it may still write, then zeros
 ///              are written and read back, again and again until they are verified
 ///
@@ -94,6 +95,7 @@ class BoardGuard {
   [[nodiscard]] driver::IoResult access(bool only_look) noexcept;
   void look_at_board() noexcept;
   void watch() noexcept;
+  void look_before_first_cycle() noexcept;
   [[nodiscard]] bool believe_once_seen() noexcept;
   void dismiss() noexcept;
   void begin_to_act(bool writes_zeros_only) noexcept;

@@ -169,6 +169,13 @@ pid_t start_companion(std::vector<int> keeps, Work work) {
   ::_exit(exit_not_started);
 }
 
+/// A process of the service beside the guard.
+struct Companion {
+  pid_t pid{0};
+  driver::FileDescriptor process{-1};
+  std::int64_t next_start_ns{0};
+};
+
 /// The guard's process with its two companions. The guard never waits for them.
 class Service {
  public:
@@ -198,10 +205,14 @@ class Service {
     const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
     realtime_ = &realtime.report();
     if (!realtime_->realtime()) say("NOT IN REAL TIME: it may act late\n" + realtime_->shortcomings());
+    guard_process_ = driver::FileDescriptor(open_pidfd(::getpid()));
     start_standby();
     start_talker();
     tell_systemd("READY=1");
-    run_guard(guard, clock_, [&] { between_looks(guard); });
+    run_guard(guard, clock_, [&] {
+      between_looks(guard);
+      return Companions{talker_.process.get(), standby_.process.get()};
+    });
     page_->over.store(true, std::memory_order_relaxed);
     ::unlink(options.socket.c_str());
     end_companions();
@@ -209,7 +220,8 @@ class Service {
   }
 
  private:
-  static constexpr std::int64_t companions_ns = 50'000'000;
+  /// One that ends is started again at once, but not one that cannot live, again and again.
+  static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
@@ -221,37 +233,41 @@ class Service {
       tell_systemd("WATCHDOG=1");
       next_alive_ns_ = now_ns + alive_ns;
     }
-    if (now_ns < next_companions_ns_) return;
-    next_companions_ns_ = now_ns + companions_ns;
     const std::uint64_t beats = page_->talker_beats.load(std::memory_order_relaxed);
     if (beats != talker_beats_) talker_beat_ns_ = now_ns;
     talker_beats_ = beats;
-    if (talker_ > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_, SIGKILL);
+    if (talker_.pid > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_.pid, SIGKILL);
     for (pid_t child = 0; (child = ::waitpid(-1, nullptr, WNOHANG)) > 0;) {
-      if (child == standby_) standby_ = 0;
-      if (child != talker_) continue;
-      talker_ = 0;
-      guard.lost_talker();
+      if (child == talker_.pid) guard.lost_talker();
+      for (Companion* const one : {&talker_, &standby_}) {
+        if (child == one->pid) *one = {.next_start_ns = one->next_start_ns};
+      }
     }
     // What fails for want of memory or processes is tried again: the guard does not depend on it.
-    if (talker_ <= 0) restart_talker();
-    if (standby_ <= 0) start_standby();
+    if (standby_.pid <= 0 && now_ns >= standby_.next_start_ns) start_standby();
+    if (talker_.pid <= 0 && now_ns >= talker_.next_start_ns) restart_talker();
   }
 
   void restart_talker() noexcept try {
     mail_ = Mail();
     start_talker();
   } catch (const std::exception&) {
-    talker_ = 0;
+    talker_ = {};
   }
 
   void start_talker() {
     talker_beat_ns_ = clock_.now_ns();
-    talker_ = start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
-                              [this](pid_t guard) { talk(guard); });
+    start(talker_, {listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
+          [this](pid_t guard) { talk(guard); });
   }
   void start_standby() {
-    standby_ = start_companion({}, [this](pid_t guard) { stand_by(guard); });
+    start(standby_, {guard_process_.get()}, [this](pid_t /*guard*/) { stand_by(); });
+  }
+  template <typename Work>
+  void start(Companion& one, std::vector<int> keeps, Work work) {
+    one.next_start_ns = clock_.now_ns() + start_again_ns;
+    one.pid = start_companion(std::move(keeps), work);
+    one.process = driver::FileDescriptor(one.pid > 0 ? open_pidfd(one.pid) : -1);
   }
 
   [[noreturn]] void talk(pid_t guard) {
@@ -298,16 +314,15 @@ class Service {
     }
   }
 
-  [[noreturn]] void stand_by(pid_t guard) {
+  /// Its first look finds a guard that has died meanwhile, too.
+  [[noreturn]] void stand_by() {
     const auto board = driver::make_safe_state_writer(settings_.driver, true);
     LinuxProcesses processes;
-    const driver::FileDescriptor guard_process(open_pidfd(guard));
-    if (::getppid() != guard || guard_process.get() < 0) ::_exit(exit_not_started);
     Standby standby({.clock = clock_,
                      .board = *board,
                      .processes = processes,
                      .page = *page_,
-                     .guard = guard_process.get(),
+                     .guard = guard_process_.get(),
                      .silence_ns = static_cast<std::int64_t>(settings_.guardian.standby_ms * rig::ns_per_ms)});
     standby.look();  // before a lease can be granted, if possible: it opens the board
     const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
@@ -323,7 +338,7 @@ class Service {
   void end_companions() {
     constexpr std::int64_t patience_ns = 500'000'000;
     const std::int64_t until_ns = clock_.now_ns() + patience_ns;
-    std::vector<pid_t> left{talker_, standby_};
+    std::vector<pid_t> left{talker_.pid, standby_.pid};
     while (!left.empty() && clock_.now_ns() < until_ns) {
       std::erase_if(left, [](pid_t child) { return child <= 0 || ::waitpid(child, nullptr, WNOHANG) != 0; });
       clock_.sleep_until(clock_.now_ns() + 2'000'000);
@@ -339,10 +354,10 @@ class Service {
   ServicePage* page_{nullptr};
   driver::FileDescriptor listener_{-1};
   const runtime::RealtimeReport* realtime_{nullptr};
-  pid_t talker_{0};
-  pid_t standby_{0};
+  driver::FileDescriptor guard_process_{-1};
+  Companion talker_{};
+  Companion standby_{};
   std::int64_t next_alive_ns_{0};
-  std::int64_t next_companions_ns_{0};
   std::int64_t talker_beat_ns_{0};
   std::uint64_t talker_beats_{0};
 };

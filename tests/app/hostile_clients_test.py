@@ -199,6 +199,32 @@ class ZeroUnlessCovered(HostileTest):
         service.end()
         return times
 
+    def test_foreign_duty_between_the_cover_and_the_first_cycle(self):
+        self.hold(lambda: enough(self.duties_before_the_first_cycle), 'foreign duty, covered and not cycling', 20)
+
+    def duties_before_the_first_cycle(self):
+        """Of a run that begins 0.9 s after a whole second, and is covered from 0.4 s on."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        writer = ForeignWriter(emulator)
+        time.sleep(-time.monotonic() % 1)
+        begins = round(time.monotonic()) + 1.9
+        program = subprocess.Popen(
+            [pathlib.Path(PROGRAM).resolve(), 'latency', '--backend', 'rig', '--duration', '0.1', '--secaligned', '900000',
+             *settings(f'driver.pci.root={emulator.root}', 'guardian.resident=require', f'guardian.socket={service.socket}',
+                       'guardian.timeout_ms=500')], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self._programs.append(program)
+        wait_until(lambda: 'lease granted' in service.said(), 'no lease')
+        self.assertLess(time.monotonic(), begins - 1, 'this computer is too slow')
+        times = []
+        for before_s in (0.4, 0.3, 0.2):
+            time.sleep(max(0, begins - before_s - time.monotonic()))
+            times.append(self.foreign_duty(emulator, writer))
+            self.assertLess(time.monotonic(), begins)
+        program.wait(timeout=20)
+        service.end()
+        return times
+
     def test_service_writes_zeros_first(self):
         """Before its socket, its companions and its log."""
         emulator = self.emulator()
