@@ -25,6 +25,7 @@ constexpr std::int64_t blind_most_ns = 100'000'000;
 /// A holder whose board shows duties again and again drives it without being watched. A single one may be another's.
 constexpr int foreign_duty_weighs = 2;
 constexpr int foreign_duties_most = 12;
+constexpr std::int64_t foreign_forgotten_ns = 60'000'000'000;
 /// A look between the index and the data of an access of the run's would spoil that access, so looks begin after the
 /// run has had the time to take over its outputs.
 constexpr std::int64_t takes_over_within_ns = 15'000'000;
@@ -190,6 +191,11 @@ void BoardGuard::look_at_board() noexcept {
   const bool foreign = board_.error == driver::IoError::foreign_writer;
   foreign_duties_ =
       foreign ? std::min(foreign_duties_ + foreign_duty_weighs, foreign_duties_most) : std::max(0, foreign_duties_ - 1);
+  if (foreign) {
+    foreign_looks_ =
+        now_ns_ - foreign_seen_ns_ > foreign_forgotten_ns ? 1 : std::min(foreign_looks_ + 1, foreign_looks_most);
+    foreign_seen_ns_ = now_ns_;
+  }
   safe_ = board_.ok() && former_gone();
   next_keep_ns_ = now_ns_ + (foreign || foreign_duties_ > 0 ? quick_pause_ns
                              : board_.ok()                  ? parts_.keep_ns

@@ -27,6 +27,8 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "driver/monotonic_time.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
@@ -34,6 +36,7 @@
 #include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
 #include "guardian/talker.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"
 
 namespace abs_hil::guardian {
@@ -223,6 +226,7 @@ class Service {
   /// One that ends is started again at once, but not one that cannot live, again and again.
   static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
+  static constexpr std::int64_t tale_ns = 10'000'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
 
@@ -239,13 +243,18 @@ class Service {
     if (talker_.pid > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_.pid, SIGKILL);
     for (pid_t child = 0; (child = ::waitpid(-1, nullptr, WNOHANG)) > 0;) {
       if (child == talker_.pid) guard.lost_talker();
-      for (Companion* const one : {&talker_, &standby_}) {
+      for (Companion* const one : {&talker_, &standby_, &hunter_}) {
         if (child == one->pid) *one = {.next_start_ns = one->next_start_ns};
       }
     }
     // What fails for want of memory or processes is tried again: the guard does not depend on it.
     if (standby_.pid <= 0 && now_ns >= standby_.next_start_ns) start_standby();
     if (talker_.pid <= 0 && now_ns >= talker_.next_start_ns) restart_talker();
+    if (guard.driven_by_others() && hunter_.pid <= 0 && now_ns >= hunter_.next_start_ns) {
+      const bool tells = now_ns >= next_tale_ns_;
+      if (tells) next_tale_ns_ = now_ns + tale_ns;
+      start(hunter_, {}, [this, tells](pid_t /*guard*/) { hunt(tells); });
+    }
   }
 
   void restart_talker() noexcept try {
@@ -270,6 +279,25 @@ class Service {
     one.process = driver::FileDescriptor(one.pid > 0 ? open_pidfd(one.pid) : -1);
   }
 
+  /// Ends those who drive the board without a cover, as `abs_hil safe` does. They are asked first, but not for long.
+  [[noreturn]] void hunt(bool tells) {
+    constexpr sched_param below_guard{.sched_priority = 1};
+    if (::sched_getscheduler(0) == SCHED_FIFO) ::sched_setscheduler(0, SCHED_FIFO, &below_guard);
+    std::vector<BoardOwner> owners = owners_of({files_of_board(settings_.driver)});
+    // The holder has a right to have the board open: others are suspected first.
+    const pid_t holder = page_->holder.load(std::memory_order_relaxed);
+    if (owners.size() > 1) std::erase_if(owners, [holder](const BoardOwner& owner) { return owner.pid == holder; });
+    end_owners(owners, [](std::size_t /*board*/, std::int64_t asked_ns) {
+      constexpr std::int64_t ends_within_ns = 20'000'000;
+      return driver::monotonic_ns() > asked_ns + ends_within_ns;
+    });
+    for (const BoardOwner& owner : owners) {
+      say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
+          ") drove the board without being guarded, and " + (owner.ended ? "was ended" : "could not be ended"));
+    }
+    if (owners.empty() && tells) say("something drives the board, and no process of this computer has it open");
+    ::_exit(exit_verified);
+  }
   [[noreturn]] void talk(pid_t guard) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != guard) ::_exit(exit_not_started);
@@ -357,6 +385,8 @@ class Service {
   driver::FileDescriptor guard_process_{-1};
   Companion talker_{};
   Companion standby_{};
+  Companion hunter_{};
+  std::int64_t next_tale_ns_{0};
   std::int64_t next_alive_ns_{0};
   std::int64_t talker_beat_ns_{0};
   std::uint64_t talker_beats_{0};

@@ -278,3 +278,43 @@ TEST_CASE("a holder that begins no cycle within a second of the cover is ended")
   service.pass(20 * ms);
   CHECK_FALSE(service.processes.lives(run_process));
 }
+
+TEST_CASE("the guard says that somebody drives without a cover after five looks, at any pace, and while it lasts") {
+  const std::int64_t every_ms = GENERATE(1, 10, 200, 5'000);
+  Service service;
+  service.guard.begin();
+  std::int64_t on_ns = 0;
+  service.happens = [&](std::int64_t now_ns) {
+    if (now_ns % (every_ms * ms) == 0) service.board.duty = 0.5;
+    if (service.board.duty > 0.0) on_ns += 100 * us;
+  };
+  const std::int64_t from_ns = service.clock.now_ns();
+  while (!service.guard.driven_by_others()) {
+    service.pass(ms);
+    REQUIRE(service.clock.now_ns() - from_ns <= 5 * every_ms * ms + 20 * ms);
+  }
+  CAPTURE(every_ms);
+  CHECK(on_ns <= 30 * ms);
+  service.happens = {};
+  service.pass(50 * ms);
+  CHECK_FALSE(service.guard.driven_by_others());
+}
+
+TEST_CASE("a board that comes back with a duty is no foreign writer, nor is a run that is covered") {
+  Service service;
+  service.guard.begin();
+  for (int time = 0; time < 5; ++time) {
+    service.board.duty = 0.5;
+    service.pass(50 * ms);
+    CHECK(service.board.duty == 0.0);
+    CHECK_FALSE(service.guard.driven_by_others());
+    service.pass(61'000 * ms);
+  }
+  static_cast<void>(service.covered());
+  service.pass(2 * ms);
+  for (int look = 0; look < 100; ++look) {
+    service.board.duty = 0.5;
+    service.pass(ms);
+    REQUIRE_FALSE(service.guard.driven_by_others());
+  }
+}

@@ -323,6 +323,11 @@ Backend hm2_backend() {
       .outputs = output_grid,
       .reality = reality,
       .check = check,
+      .udp_peer =
+          [](const Hm2Options& options) {
+            const sockaddr_in peer = parse_address(options.address);
+            return formatted("%08X:%04X", peer.sin_addr.s_addr, static_cast<unsigned>(ntohs(peer.sin_port)));
+          },
       .free_options = {"address", "answer_timeout_us", "plausible_speed_rad_s"},
   });
 }
