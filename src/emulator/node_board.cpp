@@ -106,8 +106,9 @@ class NodeBoard final : public UdpBoard {
     note_outputs("power-on");
   }
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override {
-    if (!core_.armed) return next_ns;
-    const auto left_us = static_cast<std::int32_t>(core_.fed_us + core_.allowed_us - now_us());
+    if (!core_.armed && core_.latched) return next_ns;
+    const std::uint32_t most_us = core_.armed ? core_.allowed_us : NODE_LONGEST_US;
+    const auto left_us = static_cast<std::int32_t>(core_.fed_us + most_us - now_us());
     return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { look(); }
