@@ -226,7 +226,7 @@ class Service {
   /// One that ends is started again at once, but not one that cannot live, again and again.
   static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
-  static constexpr std::int64_t tale_ns = 10'000'000'000;
+  static constexpr std::int64_t tale_ns = 1'000'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
 
@@ -291,11 +291,12 @@ class Service {
       constexpr std::int64_t ends_within_ns = 20'000'000;
       return driver::monotonic_ns() > asked_ns + ends_within_ns;
     });
+    if (!tells) ::_exit(exit_verified);
     for (const BoardOwner& owner : owners) {
       say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
           ") drove the board without being guarded, and " + (owner.ended ? "was ended" : "could not be ended"));
     }
-    if (owners.empty() && tells) say("something drives the board, and no process of this computer has it open");
+    if (owners.empty()) say("something drives the board, and no process of this computer has it open");
     ::_exit(exit_verified);
   }
   [[noreturn]] void talk(pid_t guard) {
@@ -322,7 +323,16 @@ class Service {
                       .read_terms = read_terms,
                       .scheduling = realtime_->scheduling,
                       .shortcomings = realtime_->realtime() ? std::string() : realtime_->shortcomings(),
-                      .tell = say,
+                      .tell =
+                          [next_ns = INT64_MIN, left_out = 0](const std::string& text) mutable {
+                            // 2,000 lines at once, then one a second: clients must not fill the log.
+                            const std::int64_t now_ns = driver::monotonic_ns();
+                            next_ns = std::max(next_ns, now_ns - 2'000 * rig::ns_per_s);
+                            if (next_ns > now_ns) return static_cast<void>(++left_out);
+                            next_ns += rig::ns_per_s;
+                            if (left_out > 0) say("left out " + std::to_string(std::exchange(left_out, 0)) + " lines");
+                            say(text);
+                          },
                       .status =
                           [told = std::string()](const std::string& text) mutable {
                             if (std::exchange(told, text) != text) tell_systemd("STATUS=" + text);

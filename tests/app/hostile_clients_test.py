@@ -470,6 +470,25 @@ class HostileClients(HostileTest):
         self.assertFalse([line for line in service.said().splitlines() if line.startswith(forged)])
         self.assertNotIn('\x1b', service.said())
 
+    def test_clients_cannot_fill_the_log(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        began = time.monotonic()
+        for _ in range(2500):  # each refusal is a line of the log
+            with connect(service.socket) as client:
+                send(client, ASK, b'another board', [os.pidfd_open(os.getpid())])
+                receive(client)
+        lines = service.said().count('refused a lease')
+        self.assertGreaterEqual(lines, 1000)
+        self.assertLessEqual(lines, 2000 + time.monotonic() - began)
+
+        def left_out():
+            with connect(service.socket) as client:
+                send(client, ASK, b'another board', [os.pidfd_open(os.getpid())])
+                receive(client)
+            return 'left out ' in service.said()
+        wait_until(left_out, 'it does not say how many lines it left out')
+
     def test_full_log_holds_nobody_up(self):
         """Nobody reads the pipe that is the service's stderr."""
         emulator = self.emulator()
