@@ -227,6 +227,7 @@ class Service {
   static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
   static constexpr std::int64_t tale_ns = 1'000'000'000;
+  static constexpr std::int64_t ends_within_ns = 20'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
 
@@ -287,10 +288,8 @@ class Service {
     // The holder has a right to have the board open: others are suspected first.
     const pid_t holder = page_->holder.load(std::memory_order_relaxed);
     if (owners.size() > 1) std::erase_if(owners, [holder](const BoardOwner& owner) { return owner.pid == holder; });
-    end_owners(owners, [](std::size_t /*board*/, std::int64_t asked_ns) {
-      constexpr std::int64_t ends_within_ns = 20'000'000;
-      return driver::monotonic_ns() > asked_ns + ends_within_ns;
-    });
+    const auto must_go = [](auto, std::int64_t asked_ns) { return driver::monotonic_ns() > asked_ns + ends_within_ns; };
+    end_owners(owners, must_go);
     if (!tells) ::_exit(exit_verified);
     for (const BoardOwner& owner : owners) {
       say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +

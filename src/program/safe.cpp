@@ -28,7 +28,6 @@ namespace abs_hil::program {
 namespace {
 
 using guardian::BoardOwner;
-
 constexpr double most_insist_s = 3600.0;
 
 /// Options of `abs_hil safe` as typed.
