@@ -55,6 +55,7 @@ static void load_watchdog(struct node_core *node, uint32_t clocks) {
   node->armed = !off;
   node->allowed_us = us < NODE_LONGEST_US ? us : NODE_LONGEST_US;
   node->fed_us = node->now_us;
+  node->feeds = true;
   if (now) bite(node);
 }
 
@@ -71,12 +72,14 @@ static void write_status(struct node_core *node, uint32_t value) {
     return;
   }
   node->latched = false;
-  node->number_known = false; /* unless this datagram has a number */
+  node->fed_us = node->now_us; /* the time to arm the watchdog runs from now on */
+  node->number_known = false;  /* unless this datagram has a number */
 }
 
 void node_poll(struct node_core *node, uint32_t now_us) {
   node->now_us = now_us;
-  if (node->armed && now_us - node->fed_us >= node->allowed_us) bite(node);
+  const uint32_t most_us = node->armed ? node->allowed_us : NODE_LONGEST_US;
+  if ((node->armed || !node->latched) && now_us - node->fed_us >= most_us) bite(node);
 }
 
 void node_init(struct node_core *node, const struct node_identity *identity) {
@@ -369,13 +372,26 @@ static bool is_stale(const struct node_core *before, const struct node_core *nod
   return node->numbered && permitted(before) && before->number_known && step - 1U >= MOST_AHEAD;
 }
 
+/* The owner is who numbers its datagrams. One without a number may then only make the outputs safer: it may not feed the
+   watchdog, set a duty other than 0, or switch a pin on. A host that has sent no number since the activation has no owner's
+   rights to defend: LinuxCNC before 2.8 sends none. */
+static bool is_not_of_owner(const struct node_core *before, const struct node_core *node) {
+  if (node->numbered || !before->number_known || !permitted(before) || !permitted(node)) return false;
+  bool drives = node->feeds || (node_output(node) && !node_output(before));
+  for (unsigned i = 0; i < NODE_CHANNELS; ++i) {
+    drives |= node_duty(node, i) != 0 && node_duty(node, i) != node_duty(before, i);
+    drives |= node_drives(node, i) && !node_drives(before, i);
+  }
+  return drives || node->pwm_rate != before->pwm_rate;
+}
+
 size_t node_datagram(struct node_core *node, uint32_t now_us, const uint8_t *datagram, size_t length, uint8_t *answer) {
   node_poll(node, now_us);
   ++node->control[CONTROL_RX];
   ++node->control[CONTROL_RX + 1];
   const struct node_core before = *node;
   const size_t answered = obey_all(node, datagram, length, answer);
-  if (is_stale(&before, node)) node->refused = CONTROL_WRITE;
+  if (is_stale(&before, node) || is_not_of_owner(&before, node)) node->refused = CONTROL_WRITE;
   if (node->refused != 0) {
     const unsigned which = node->refused;
     *node = before; /* outputs follow the registers only after this function */
@@ -383,7 +399,7 @@ size_t node_datagram(struct node_core *node, uint32_t now_us, const uint8_t *dat
     return 0;
   }
   if (node->numbered) node->number_known = true;
-  node->numbered = false;
+  node->numbered = node->feeds = false;
   if (answered > 0) {
     ++node->control[CONTROL_TX];
     ++node->control[CONTROL_TX + 1];

@@ -6,9 +6,11 @@
      - A bite is latched. Until the host activates again, no pin is driven: a write of 0 to the status clears the latch
        only while both PWM values are 0, and if the watchdog has not been fed since the bite. A host that has fed it
        must first switch the watchdog off, or let it bite now.
-     - The watchdog's time is at most NODE_LONGEST_US, and without an armed watchdog no pin is driven.
+     - The watchdog's time is at most NODE_LONGEST_US, and without an armed watchdog no pin is driven. A latch that was
+       opened closes again if the watchdog is not armed within that time.
      - A datagram acts as a whole or, with no answer, not at all: if it breaks off, asks for too much, or a write in it is
-       refused. While outputs are permitted, one whose write number is not among the 1,024 after the last is refused.
+       refused. While outputs are permitted, one whose write number is not among the 1,024 after the last is refused. If
+       their host numbers its datagrams, one without a number is refused unless it makes the outputs safer.
      - A PWM output acts while it is high; the inversion, which the wiring of a 7I92 needs, is stored and does nothing. */
 #ifndef NODE_CORE_H
 #define NODE_CORE_H
@@ -44,6 +46,7 @@ struct node_core {
   uint32_t watchdog_clocks, allowed_us, fed_us;
   bool armed, latched, fed_since_bite, number_known;
   bool numbered;        /* the datagram at hand has written to the write number */
+  bool feeds;           /* and has loaded the watchdog */
   uint8_t refused;      /* the error count for the datagram at hand; 0: all of it acts */
   uint8_t timers[24];   /* space 4; the last 4 are the write number */
   uint16_t control[16]; /* space 6, by words */

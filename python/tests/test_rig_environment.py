@@ -5,6 +5,7 @@ import os
 import pathlib
 import signal
 import socket
+import struct
 import subprocess
 import time
 
@@ -108,6 +109,28 @@ def test_an_agent_cannot_ask_for_more_than_the_brake_has(action, tmp_path):
     values = environment._values()
     environment.close()
     assert values['refused'] == 1 and values['acting_number'] == 0 and values['brake_torque_Nm'] < 1.0
+
+
+def test_a_number_is_asked_for(tmp_path):
+    environment = RigSlipControl('sim', set=START, folder=str(tmp_path))
+    environment.reset()
+    with pytest.raises(ValueError, match='give a number in'):
+        environment.step([np.nan])
+    _, reward, *_ = environment.step([0.2])
+    assert np.isfinite(reward)
+    environment.close()
+
+
+@pytest.mark.parametrize('hold_s', [1e9, np.nan])
+def test_an_agent_cannot_make_its_actions_last_longer_during_a_run(hold_s, tmp_path):
+    environment = RigSlipControl('sim', set=START, folder=str(tmp_path))
+    environment.reset()
+    struct.pack_into('d', environment._bytes, 8, hold_s)
+    environment._act(0.3)
+    time.sleep(0.2)
+    values = environment._values()
+    environment.close()
+    assert values['late_cycles'] > 50 and values['acting_number'] == 0
 
 
 def test_behind_gate_and_guardian_of_a_board(board, tmp_path):

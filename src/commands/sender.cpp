@@ -122,7 +122,7 @@ Reply reply_of(const Answers& answers) {
   }
   const auto reason = static_cast<rig::Reason>(answer->reason);
   const bool accepted = reason == rig::Reason::stop_command || rig::is_adjustment(reason);
-  return {accepted ? Outcome::accepted : Outcome::refused, answer->message, answers.has_key()};
+  return {accepted ? Outcome::accepted : Outcome::refused, rig::clean_text(answer->message, 300), answers.has_key()};
 }
 
 }  // namespace

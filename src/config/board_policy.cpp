@@ -66,20 +66,12 @@ void refuse_injection_into_hardware(const Settings& s) {
 }
 
 void refuse_hardware_without_guardian(const Settings& s) {
-  if (s.guardian.enabled) return;
-  const driver::DriverOptions& d = s.driver;
-  if (d.emulated) {
-    const driver::BoardReality board = reality(d);
-    if (!is_certainly_real(board)) return;
-    throw std::invalid_argument(fmt::format(
-        "guardian.enabled = false: driver.emulated=true, but {} is real hardware, and real hardware needs a "
-        "guardian; leave guardian.enabled out, or name the emulator's",
-        board.option));
-  }
-  throw std::invalid_argument(
-      "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold when the program dies; leave "
-      "it "
-      "out, or for an emulator (never hardware) --set driver.emulated=true");
+  const driver::BoardReality board = reality(s.driver);
+  if (s.guardian.enabled || (s.driver.emulated && !is_certainly_real(board))) return;
+  throw std::invalid_argument(fmt::format(
+      "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold when the program dies{}; "
+      "leave it out, or for an emulator (never hardware) --set driver.emulated=true",
+      s.driver.emulated ? fmt::format(", and {} is real hardware", board.option) : ""));
 }
 
 /// Silence of a single late cycle must not end a run.

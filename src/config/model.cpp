@@ -85,8 +85,7 @@ std::string slip_out_of_reach(const Script& script, const Settings& s) {
   }
   return fmt::format(
       "gate.brake_duty_max = {:.3g}: the brake gives at most {:.3g} N m, but a slip of {:.3g} takes {:.3g} N m at "
-      "{}.theta_N = {:.6g} N, so control.slip_ref = {:.3g} is out of reach and the slip stays below about {:.2g}; "
-      "raise "
+      "{}.theta_N = {:.6g} N, so control.slip_ref = {:.3g} is out of reach: the slip stays below about {:.2g}; raise "
       "the cap if brake and supply bear it, or give a control.slip_ref below {:.2g}",
       s.gate.brake_duty_max, most_Nm, least_slip, needed_Nm, of_plant ? "plant" : "model", rig.tyre.theta_N,
       s.control.slip_ref, reached, reached);

@@ -83,6 +83,11 @@ struct UnsafeOptions {
                      "accept that code from a file, which no test of this project has seen, runs in the control cycle: "
                      "allows --controller FILE on a board",
                  .safety = {.kind = rig::SafetyClass::Kind::consent});
+  ABS_HIL_OPTION(bool, foreign_files, false,
+                 .meaning =
+                     "accept that a controller from a file could change the files of this user: allows --controller "
+                     "FILE where the kernel has no Landlock",
+                 .safety = {.kind = rig::SafetyClass::Kind::consent});
   ABS_HIL_OPTION(std::string, keys, "",
                  .meaning =
                      "accept the values of these keys, separated by commas, although they weaken the protection of a "

@@ -131,7 +131,7 @@ class Hm2Board final : public Hm2Fpga {
             .units = command & 0x7FU};
   }
   [[nodiscard]] bool takes(const Access& access) const noexcept {
-    if (access.space == lock_step && !options_.lock_step) return false;
+    if (access.space == lock_step && !options_.lock_step && !access.info) return false;
     if (access.info) return !access.write && access.unit_bytes == 2;
     const SpaceFacts& facts = spaces[access.space];
     const std::uint32_t any = access.space == flash ? 0x07U : facts.sizes & 0x0FU;
@@ -141,7 +141,7 @@ class Hm2Board final : public Hm2Fpga {
     const SpaceFacts& facts = spaces[space];
     switch (address) {
       case 0x00: return 0x5A00U + space;
-      case 0x02: return facts.sizes;
+      case 0x02: return space == lock_step && !options_.lock_step ? 0 : facts.sizes;
       case 0x04: return facts.ranges;
       case 0x06: return pointers_[space];
       case 0x08:

@@ -14,9 +14,8 @@ namespace {
 // Words of LBP16 commands in space 5.
 constexpr unsigned advances_time = 0xD682;  // then 8 bytes, ns
 constexpr unsigned reads_time = 0x5682;
-constexpr unsigned reads_cookie = 0x7501;
+constexpr unsigned reads_mark = 0x7582;
 constexpr std::size_t time_bytes = 8;
-constexpr std::array<std::uint8_t, 2> cookie{0x05, 0x5A};
 
 /// Calls `use` with each whole command's word, the place of its data, and the bytes of the answer before its own.
 template <typename Use>
@@ -53,7 +52,7 @@ class NodeBoard final : public UdpBoard {
     const bool was_latched = core_.latched;
     std::vector<std::uint8_t> reply(NODE_MOST_BYTES);
     reply.resize(node_datagram(&core_, now_us(), for_core.data(), for_core.size(), reply.data()));
-    if (options_.lock_step && !reply.empty()) answer_lock_step(datagram, reply);
+    if (!reply.empty()) answer_space_5(datagram, reply);
     bool writes = false;
     for_each_command(datagram, [&writes](unsigned word, std::size_t /*data_at*/, std::size_t /*answered*/) {
       constexpr unsigned write_and_space = 0x9C00;
@@ -112,8 +111,9 @@ class NodeBoard final : public UdpBoard {
     note_outputs("power-on");
   }
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override {
-    if (!core_.armed) return next_ns;
-    const auto left_us = static_cast<std::int32_t>(core_.fed_us + core_.allowed_us - now_us());
+    if (!core_.armed && core_.latched) return next_ns;
+    const std::uint32_t most_us = core_.armed ? core_.allowed_us : NODE_LONGEST_US;
+    const auto left_us = static_cast<std::int32_t>(core_.fed_us + most_us - now_us());
     return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { look(); }
@@ -137,12 +137,13 @@ class NodeBoard final : public UdpBoard {
     return rest;
   }
   /// Puts what space 5 answers in place of the core's zeros.
-  void answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
+  void answer_space_5(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
     const std::int64_t now_ns = time_ns();
     for_each_command(datagram, [&](unsigned word, std::size_t /*data_at*/, std::size_t answered) {
-      if (word == reads_time) std::memcpy(reply.subspan(answered, time_bytes).data(), &now_ns, time_bytes);
-      if (word == reads_cookie)
-        std::memcpy(reply.subspan(answered, cookie.size()).data(), cookie.data(), cookie.size());
+      if (word == reads_time && options_.lock_step)
+        std::memcpy(reply.subspan(answered, time_bytes).data(), &now_ns, time_bytes);
+      const std::array<std::uint8_t, 4> mark{0x05, 0x5A, options_.lock_step ? std::uint8_t{0x0F} : std::uint8_t{0}, 0};
+      if (word == reads_mark) std::memcpy(reply.subspan(answered, mark.size()).data(), mark.data(), mark.size());
     });
   }
   /// What the chip's loop does: counters, then the watchdog.

@@ -25,6 +25,10 @@ constexpr std::int64_t blind_most_ns = 100'000'000;
 /// A holder whose board shows duties again and again drives it without being watched. A single one may be another's.
 constexpr int foreign_duty_weighs = 2;
 constexpr int foreign_duties_most = 12;
+constexpr std::int64_t foreign_forgotten_ns = 60'000'000'000;
+/// A look between the index and the data of an access of the run's would spoil that access, so looks begin after the
+/// run has had the time to take over its outputs.
+constexpr std::int64_t takes_over_within_ns = 15'000'000;
 /// A board of one owner is free this long after its owner was done with it, or the owner is ended.
 constexpr std::int64_t frees_board_within_ns = 1'000'000'000;
 
@@ -135,6 +139,7 @@ void BoardGuard::cover(std::int64_t timeout_ns) noexcept {
   blind_since_ns_ = -1;
   foreign_duties_ = 0;
   now_ns_ = last_look_ns_ = parts_.clock.now_ns();
+  next_keep_ns_ = now_ns_ + takes_over_within_ns;
   suspensions_.begin(parts_.clock);
   if (parts_.mail != nullptr) parts_.board.let_go();  // the owner of the other kind has its board already
   if (parts_.page != nullptr) parts_.page->run_needs_ns.store(timeout_ns, std::memory_order_relaxed);
@@ -188,6 +193,11 @@ void BoardGuard::look_at_board() noexcept {
   const bool foreign = board_.error == driver::IoError::foreign_writer;
   foreign_duties_ =
       foreign ? std::min(foreign_duties_ + foreign_duty_weighs, foreign_duties_most) : std::max(0, foreign_duties_ - 1);
+  if (foreign) {
+    foreign_looks_ =
+        now_ns_ - foreign_seen_ns_ > foreign_forgotten_ns ? 1 : std::min(foreign_looks_ + 1, foreign_looks_most);
+    foreign_seen_ns_ = now_ns_;
+  }
   safe_ = board_.ok() && former_gone();
   next_keep_ns_ = now_ns_ + (foreign || foreign_duties_ > 0 ? quick_pause_ns
                              : board_.ok()                  ? parts_.keep_ns
@@ -257,6 +267,18 @@ void BoardGuard::watch() noexcept {
   // A run that has released its outputs need not be asked for them.
   if (verdict == Verdict::dismissed || (released && taken_back_for_ != Reason::none)) return dismiss();
   if (released && parts_.board.works_beside_owner()) static_cast<void>(believe_once_seen());
+  if (!released && reading.cycle_beats == 0 && parts_.board.tells_duties()) look_before_first_cycle();
+}
+
+/// No run drives its board before its first cycle: what is on until then is somebody else's.
+void BoardGuard::look_before_first_cycle() noexcept {
+  if (now_ns_ < next_keep_ns_) return;
+  board_ = {};  // only looks: the run has taken its outputs over
+  look_at_board();
+  next_ns_ = std::min(next_ns_, next_keep_ns_);
+  if (foreign_duties_ < foreign_duties_most) return;
+  report_.reason = Reason::foreign_writer;
+  begin_to_act(false);
 }
 
 /// Looks whether the outputs are zero, as the run says. Returns true once that was seen often enough. A run whose board

@@ -49,7 +49,8 @@ struct GuardParts {
 ///
 ///     keep     no run is covered: the outputs are looked at every `keep_ns` and kept at zero, from the start to the
 ///              end, before a run is covered, between two runs of a lease, and after it
-///     watch    a run is covered: its heartbeat is looked at eight times in its timeout; the board is the run's
+///     watch    a run is covered: its heartbeat is looked at eight times in its timeout; the board is the run's from
+///              its first cycle on, and until then it is looked at as in `keep`
 ///     act      a run died, fell silent, or must give the outputs back: it is ended if it may still write, then zeros
 ///              are written and read back, again and again until they are verified
 ///
@@ -80,8 +81,14 @@ class BoardGuard {
   /// Readable when there are orders; another one after the mail was replaced. -1: the guard takes none.
   [[nodiscard]] int orders() const noexcept { return parts_.mail == nullptr ? -1 : parts_.mail->order_descriptor(); }
   [[nodiscard]] std::int64_t look_period_ns() const noexcept { return look_period_ns_; }
+  /// Somebody without a cover drives the board: several looks have found an output on, the latest just now.
+  [[nodiscard]] bool driven_by_others() const noexcept {
+    constexpr std::int64_t recent_ns = 20'000'000;
+    return duty_ == Duty::keep && foreign_looks_ >= foreign_looks_most && now_ns_ - foreign_seen_ns_ < recent_ns;
+  }
 
  private:
+  static constexpr int foreign_looks_most = 5;
   enum class Duty : std::uint8_t { keep, watch, act };
 
   void take(const Order& order) noexcept;
@@ -94,6 +101,7 @@ class BoardGuard {
   [[nodiscard]] driver::IoResult access(bool only_look) noexcept;
   void look_at_board() noexcept;
   void watch() noexcept;
+  void look_before_first_cycle() noexcept;
   [[nodiscard]] bool believe_once_seen() noexcept;
   void dismiss() noexcept;
   void begin_to_act(bool writes_zeros_only) noexcept;
@@ -121,6 +129,8 @@ class BoardGuard {
   int looks_until_believed_{0};      ///< of a run that says that its outputs are safe
   std::int64_t blind_since_ns_{-1};  ///< since then those looks had no answer; < 0: the last had one
   int foreign_duties_{0};            ///< grows with each look that finds an output on
+  int foreign_looks_{0};             ///< those looks, until none has come for a minute
+  std::int64_t foreign_seen_ns_{0};  ///< the last of them
 
   // The lease.
   std::uint32_t lease_{0};  ///< 0: nobody has it

@@ -83,7 +83,7 @@ int guard() {
                    .scheduling = realtime.scheduling,
                    .text = lacks ? realtime.shortcomings() : std::string()});
 
-  run_guard(guard, clock, [] {});
+  run_guard(guard, clock, [] { return Companions{-1, -1}; });
   const GuardianReport& report = guard.report();
   if (report.reason == rig::Reason::none) return exit_verified;
   // The outputs are dealt with: the rest need not be real-time safe.

@@ -50,10 +50,11 @@ bool is_readable(int fd, int timeout_ms) noexcept {
   return ready > 0;
 }
 
-void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock) noexcept {
+void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock, Companions companions) noexcept {
   const std::int64_t left_ns = std::max<std::int64_t>(0, guard.next_ns() - clock.now_ns());
   const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
-  std::array<pollfd, 2> files{pollfd{guard.orders(), POLLIN, 0}, pollfd{guard.holder(), POLLIN, 0}};
+  std::array<pollfd, 4> files{pollfd{guard.orders(), POLLIN, 0}, pollfd{guard.holder(), POLLIN, 0},
+                              pollfd{companions[0], POLLIN, 0}, pollfd{companions[1], POLLIN, 0}};
   const bool over = ::ppoll(files.data(), files.size(), &left, nullptr) == 0;
   // A broken descriptor ends every wait at once: the guard must not keep the processor from all others.
   const auto readable = [](const pollfd& file) { return (file.revents & POLLIN) != 0; };

@@ -4,6 +4,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <span>
 #include <string>
@@ -36,15 +37,16 @@ class LinuxProcesses final : public Processes {
   void end(int handle) noexcept override { static_cast<void>(send_signal(handle, SIGKILL)); }
 };
 
-/// Sleeps until the guard wants to look, or there is an order, or the holder has ended.
-void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock) noexcept;
-/// Runs the guard until it is over. `between` is called after each look.
+using Companions = std::array<int, 2>;  ///< pidfds; -1: none
+/// Sleeps until the guard wants to look, or there is an order, or the holder or a companion has ended.
+void wait_for_guard(const BoardGuard& guard, runtime::Clock& clock, Companions companions) noexcept;
+/// Runs the guard until it is over. `between` is called after each look and tells the companions.
 template <class Between>
 void run_guard(BoardGuard& guard, runtime::Clock& clock, Between between) {
   while (!guard.over()) {
     guard.look();
-    between();
-    if (!guard.over()) wait_for_guard(guard, clock);
+    const Companions companions = between();
+    if (!guard.over()) wait_for_guard(guard, clock, companions);
   }
 }
 

@@ -27,6 +27,8 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "driver/monotonic_time.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "guardian/guardian_program.hpp"
@@ -34,6 +36,7 @@
 #include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
 #include "guardian/talker.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"
 
 namespace abs_hil::guardian {
@@ -169,6 +172,13 @@ pid_t start_companion(std::vector<int> keeps, Work work) {
   ::_exit(exit_not_started);
 }
 
+/// A process of the service beside the guard.
+struct Companion {
+  pid_t pid{0};
+  driver::FileDescriptor process{-1};
+  std::int64_t next_start_ns{0};
+};
+
 /// The guard's process with its two companions. The guard never waits for them.
 class Service {
  public:
@@ -198,10 +208,14 @@ class Service {
     const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
     realtime_ = &realtime.report();
     if (!realtime_->realtime()) say("NOT IN REAL TIME: it may act late\n" + realtime_->shortcomings());
+    guard_process_ = driver::FileDescriptor(open_pidfd(::getpid()));
     start_standby();
     start_talker();
     tell_systemd("READY=1");
-    run_guard(guard, clock_, [&] { between_looks(guard); });
+    run_guard(guard, clock_, [&] {
+      between_looks(guard);
+      return Companions{talker_.process.get(), standby_.process.get()};
+    });
     page_->over.store(true, std::memory_order_relaxed);
     ::unlink(options.socket.c_str());
     end_companions();
@@ -209,8 +223,11 @@ class Service {
   }
 
  private:
-  static constexpr std::int64_t companions_ns = 50'000'000;
+  /// One that ends is started again at once, but not one that cannot live, again and again.
+  static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
+  static constexpr std::int64_t tale_ns = 1'000'000'000;
+  static constexpr std::int64_t ends_within_ns = 20'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
 
@@ -221,39 +238,66 @@ class Service {
       tell_systemd("WATCHDOG=1");
       next_alive_ns_ = now_ns + alive_ns;
     }
-    if (now_ns < next_companions_ns_) return;
-    next_companions_ns_ = now_ns + companions_ns;
     const std::uint64_t beats = page_->talker_beats.load(std::memory_order_relaxed);
     if (beats != talker_beats_) talker_beat_ns_ = now_ns;
     talker_beats_ = beats;
-    if (talker_ > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_, SIGKILL);
+    if (talker_.pid > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_.pid, SIGKILL);
     for (pid_t child = 0; (child = ::waitpid(-1, nullptr, WNOHANG)) > 0;) {
-      if (child == standby_) standby_ = 0;
-      if (child != talker_) continue;
-      talker_ = 0;
-      guard.lost_talker();
+      if (child == talker_.pid) guard.lost_talker();
+      for (Companion* const one : {&talker_, &standby_, &hunter_}) {
+        if (child == one->pid) *one = {.next_start_ns = one->next_start_ns};
+      }
     }
     // What fails for want of memory or processes is tried again: the guard does not depend on it.
-    if (talker_ <= 0) restart_talker();
-    if (standby_ <= 0) start_standby();
+    if (standby_.pid <= 0 && now_ns >= standby_.next_start_ns) start_standby();
+    if (talker_.pid <= 0 && now_ns >= talker_.next_start_ns) restart_talker();
+    if (guard.driven_by_others() && hunter_.pid <= 0 && now_ns >= hunter_.next_start_ns) {
+      const bool tells = now_ns >= next_tale_ns_;
+      if (tells) next_tale_ns_ = now_ns + tale_ns;
+      start(hunter_, {}, [this, tells](pid_t /*guard*/) { hunt(tells); });
+    }
   }
 
   void restart_talker() noexcept try {
     mail_ = Mail();
     start_talker();
   } catch (const std::exception&) {
-    talker_ = 0;
+    talker_ = {};
   }
 
   void start_talker() {
     talker_beat_ns_ = clock_.now_ns();
-    talker_ = start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
-                              [this](pid_t guard) { talk(guard); });
+    start(talker_, {listener_.get(), mail_.order_end(), mail_.news_descriptor(), systemd_socket()},
+          [this](pid_t guard) { talk(guard); });
   }
   void start_standby() {
-    standby_ = start_companion({}, [this](pid_t guard) { stand_by(guard); });
+    start(standby_, {guard_process_.get()}, [this](pid_t /*guard*/) { stand_by(); });
+  }
+  template <typename Work>
+  void start(Companion& one, std::vector<int> keeps, Work work) {
+    one.next_start_ns = clock_.now_ns() + start_again_ns;
+    one.pid = start_companion(std::move(keeps), work);
+    one.process = driver::FileDescriptor(one.pid > 0 ? open_pidfd(one.pid) : -1);
   }
 
+  /// Ends those who drive the board without a cover, as `abs_hil safe` does. They are asked first, but not for long.
+  [[noreturn]] void hunt(bool tells) {
+    constexpr sched_param below_guard{.sched_priority = 1};
+    if (::sched_getscheduler(0) == SCHED_FIFO) ::sched_setscheduler(0, SCHED_FIFO, &below_guard);
+    std::vector<BoardOwner> owners = owners_of({files_of_board(settings_.driver)});
+    // The holder has a right to have the board open: others are suspected first.
+    const pid_t holder = page_->holder.load(std::memory_order_relaxed);
+    if (owners.size() > 1) std::erase_if(owners, [holder](const BoardOwner& owner) { return owner.pid == holder; });
+    const auto must_go = [](auto, std::int64_t asked_ns) { return driver::monotonic_ns() > asked_ns + ends_within_ns; };
+    end_owners(owners, must_go);
+    if (!tells) ::_exit(exit_verified);
+    for (const BoardOwner& owner : owners) {
+      say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
+          ") drove the board without being guarded, and " + (owner.ended ? "was ended" : "could not be ended"));
+    }
+    if (owners.empty()) say("something drives the board, and no process of this computer has it open");
+    ::_exit(exit_verified);
+  }
   [[noreturn]] void talk(pid_t guard) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != guard) ::_exit(exit_not_started);
@@ -277,7 +321,16 @@ class Service {
                       .read_terms = read_terms,
                       .scheduling = realtime_->scheduling,
                       .shortcomings = realtime_->realtime() ? std::string() : realtime_->shortcomings(),
-                      .tell = say,
+                      .tell =
+                          [next_ns = INT64_MIN, left_out = 0](const std::string& text) mutable {
+                            // 2,000 lines at once, then one a second: clients must not fill the log.
+                            const std::int64_t now_ns = driver::monotonic_ns();
+                            next_ns = std::max(next_ns, now_ns - 2'000 * rig::ns_per_s);
+                            if (next_ns > now_ns) return static_cast<void>(++left_out);
+                            next_ns += rig::ns_per_s;
+                            if (left_out > 0) say("left out " + std::to_string(std::exchange(left_out, 0)) + " lines");
+                            say(text);
+                          },
                       .status =
                           [told = std::string()](const std::string& text) mutable {
                             if (std::exchange(told, text) != text) tell_systemd("STATUS=" + text);
@@ -296,16 +349,15 @@ class Service {
     }
   }
 
-  [[noreturn]] void stand_by(pid_t guard) {
+  /// Its first look finds a guard that has died meanwhile, too.
+  [[noreturn]] void stand_by() {
     const auto board = driver::make_safe_state_writer(settings_.driver, true);
     LinuxProcesses processes;
-    const driver::FileDescriptor guard_process(open_pidfd(guard));
-    if (::getppid() != guard || guard_process.get() < 0) ::_exit(exit_not_started);
     Standby standby({.clock = clock_,
                      .board = *board,
                      .processes = processes,
                      .page = *page_,
-                     .guard = guard_process.get(),
+                     .guard = guard_process_.get(),
                      .silence_ns = static_cast<std::int64_t>(settings_.guardian.standby_ms * rig::ns_per_ms)});
     standby.look();  // before a lease can be granted, if possible: it opens the board
     const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
@@ -321,7 +373,7 @@ class Service {
   void end_companions() {
     constexpr std::int64_t patience_ns = 500'000'000;
     const std::int64_t until_ns = clock_.now_ns() + patience_ns;
-    std::vector<pid_t> left{talker_, standby_};
+    std::vector<pid_t> left{talker_.pid, standby_.pid};
     while (!left.empty() && clock_.now_ns() < until_ns) {
       std::erase_if(left, [](pid_t child) { return child <= 0 || ::waitpid(child, nullptr, WNOHANG) != 0; });
       clock_.sleep_until(clock_.now_ns() + 2'000'000);
@@ -337,10 +389,12 @@ class Service {
   ServicePage* page_{nullptr};
   driver::FileDescriptor listener_{-1};
   const runtime::RealtimeReport* realtime_{nullptr};
-  pid_t talker_{0};
-  pid_t standby_{0};
+  driver::FileDescriptor guard_process_{-1};
+  Companion talker_{};
+  Companion standby_{};
+  Companion hunter_{};
+  std::int64_t next_tale_ns_{0};
   std::int64_t next_alive_ns_{0};
-  std::int64_t next_companions_ns_{0};
   std::int64_t talker_beat_ns_{0};
   std::uint64_t talker_beats_{0};
 };

@@ -17,7 +17,6 @@ void Watchdog::measure_silence(const HeartbeatReading& reading) noexcept {
 
 std::int64_t Watchdog::patience_ns(const HeartbeatReading& reading) const noexcept {
   if (reading.stage == Stage::making_safe) return timeout_ns_ + making_safe_ns_;
-  // No output can be driven before the first cycle.
   return reading.cycle_beats == 0 ? std::max(timeout_ns_, first_beat_ns) : timeout_ns_;
 }
 

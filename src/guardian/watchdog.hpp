@@ -39,8 +39,8 @@ class Watchdog {
   Watchdog(std::int64_t timeout_ns, std::int64_t look_period_ns, std::int64_t making_safe_ns = 0) noexcept
       : timeout_ns_(timeout_ns), look_period_ns_(look_period_ns), making_safe_ns_(making_safe_ns) {}
 
-  /// A run that waits for a whole second begins its first cycle within this time, ns.
-  static constexpr std::int64_t first_beat_ns = 10'000'000'000;
+  /// A run that is covered begins its first cycle within this time, ns.
+  static constexpr std::int64_t first_beat_ns = 1'000'000'000;
 
   [[nodiscard]] Verdict look(const HeartbeatReading& reading) noexcept;
   /// Why the safe state is needed; `none` as long as it is not. Also set if the controller died after it had released

@@ -47,6 +47,7 @@ AgentPage* mapped(const std::string& file) {
 
 AgentController::AgentController(const std::string& file, const control::ControllerContext& context)
     : page_(mapped(file)),
+      hold_s_(std::min(longest_hold_s, page_->hold_s)),
       r2_m_(context.rig.wheels.r2_m),
       full_torque_Nm_(rig::brake_torque_at(context.rig.brake, 1.0)) {}
 
@@ -71,7 +72,7 @@ void AgentController::take_action(double dt_s) noexcept {
     if (acts_) action_ = asked;
     if (!acts_) ++refused_;
   }
-  if (age_s_ > page_->hold_s) acts_ = false;
+  if (age_s_ > hold_s_) acts_ = false;
   if (!acts_) {
     action_ = 0.0;
     ++late_cycles_;

@@ -63,6 +63,7 @@ class AgentController final : public control::SlipController {
   void show(const control::SlipInput& input) noexcept;
 
   AgentPage* page_{nullptr};
+  double hold_s_;  ///< of the page, which the agent may change, as it was at first
   double r2_m_;
   double full_torque_Nm_;  ///< of a brake without an upper end
   std::uint32_t number_{0};

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <linux/capability.h>
 #include <seccomp.h>
+#include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -32,11 +33,20 @@ namespace {
 constexpr std::string_view forbidden =
     "fork vfork execve execveat tkill ptrace process_vm_readv process_vm_writev pidfd_send_signal sched_setscheduler "
     "sched_setparam sched_setattr setpriority ioprio_set unshare setns mount umount2 reboot";
-/// They fail as they do on a system without them. Honest libraries try them and go on. They could reach around the
-/// limits, outlive the process, or change files that cannot be written.
-constexpr std::string_view absent =
-    "clone3 io_uring_setup memfd_create shmget msgget semget mq_open bpf perf_event_open pidfd_getfd keyctl add_key "
-    "userfaultfd chmod fchmod fchmodat chown lchown fchown fchownat setxattr lsetxattr fsetxattr";
+/// What honest code needs. All other calls, also those that kernels will get, fail as on a system without them:
+/// libraries try them and go on. Which files may be written is Landlock's affair; `truncate` is a gap of older ones.
+constexpr std::string_view allowed =
+    "brk mmap munmap mremap mprotect madvise mlock munlock futex rseq set_robust_list set_tid_address arch_prctl exit "
+    "exit_group wait4 sched_yield sched_getaffinity sched_getparam sched_getscheduler sched_get_priority_max "
+    "sched_get_priority_min getcpu membarrier rt_sigprocmask rt_sigreturn rt_sigsuspend sigaltstack restart_syscall "
+    "pause alarm setitimer clock_gettime clock_getres clock_nanosleep nanosleep gettimeofday time times read write "
+    "readv writev pread64 pwrite64 open openat close close_range fstat stat lstat newfstatat statx statfs fstatfs "
+    "access faccessat faccessat2 readlink readlinkat getdents getdents64 lseek dup dup2 dup3 flock fsync fdatasync "
+    "ftruncate fallocate mkdir mkdirat rmdir unlink unlinkat rename renameat renameat2 umask getcwd chdir fchdir pipe "
+    "pipe2 eventfd2 poll ppoll select pselect6 epoll_create epoll_create1 epoll_ctl epoll_wait epoll_pwait socketpair "
+    "sendto recvfrom sendmsg recvmsg shutdown getsockname getpeername getsockopt getpid getppid gettid getpgrp getuid "
+    "geteuid getgid getegid getgroups getresuid getresgid uname sysinfo getrusage getrlimit setrlimit getrandom "
+    "seccomp";
 
 TrappedSystemCalls trapped;
 int answers_to = -1;
@@ -98,21 +108,36 @@ bool filter_calls() {
   constexpr std::uint32_t set_owner = 0x8901;    // FIOSETOWN
   constexpr std::uint32_t set_group = 0x8902;    // SIOCSPGRP
   constexpr std::uint32_t ends = SCMP_ACT_TRAP;
-  Filter filter(SCMP_ACT_ALLOW);
+  Filter filter(SCMP_ACT_ERRNO(ENOSYS));
   filter.give(ends, forbidden);
-  filter.give(SCMP_ACT_ERRNO(ENOSYS), absent);
-  const scmp_arg_cmp no_thread{0, SCMP_CMP_MASKED_EQ, thread, 0};
-  filter.give(ends, "clone", {&no_thread, 1});
+  filter.give(SCMP_ACT_ALLOW, allowed);
+  // A rule for all of a call's values would displace those for some.
+  for (const std::uint64_t is_thread : {std::uint64_t{0}, thread}) {
+    const scmp_arg_cmp flags{0, SCMP_CMP_MASKED_EQ, thread, is_thread};
+    filter.give(is_thread != 0 ? SCMP_ACT_ALLOW : ends, "clone", {&flags, 1});
+  }
   // Honest libraries ask whether there is a network (Python's), or local services for names of users (the C library's).
   filter.give(SCMP_ACT_ERRNO(EACCES), "socket");
-  filter.give_if(ends, "kill tgkill rt_sigqueueinfo rt_tgsigqueueinfo", 0, own, false);
+  constexpr std::string_view signals = "kill tgkill rt_sigqueueinfo rt_tgsigqueueinfo";
+  filter.give_if(ends, signals, 0, own, false);
+  filter.give_if(SCMP_ACT_ALLOW, signals, 0, own);
   filter.give_if(ends, "prlimit64", 0, 0, false);
   filter.give_if(SCMP_ACT_ERRNO(EPERM), "sched_setaffinity", 0, 0, false);
+  filter.give_if(SCMP_ACT_ALLOW, "prlimit64 sched_setaffinity", 0, 0);
   filter.give_if(ends, "prctl", 0, PR_SET_PDEATHSIG);
-  filter.give_if(SCMP_ACT_ERRNO(EPERM), "rt_sigaction", 0, SIGSYS);
+  constexpr std::uint32_t last_signal = 64;
+  for (std::uint32_t number = 1; number <= last_signal; ++number) {
+    filter.give_if(number == SIGSYS ? SCMP_ACT_ERRNO(EPERM) : SCMP_ACT_ALLOW, "rt_sigaction", 0, number);
+  }
   // Signals to the owner of a descriptor would reach other processes.
   for (const std::uint32_t command : {F_SETOWN, F_SETSIG, F_SETOWN_EX}) filter.give_if(ends, "fcntl", 1, command);
   for (const std::uint32_t command : {set_owner, set_group}) filter.give_if(ends, "ioctl", 1, command);
+  const auto allow = [&filter](std::string_view call, unsigned n, std::initializer_list<std::uint32_t> values) {
+    for (const std::uint32_t value : values) filter.give_if(SCMP_ACT_ALLOW, call, n, value);
+  };
+  allow("prctl", 0, {PR_SET_NAME, PR_GET_NAME, PR_SET_NO_NEW_PRIVS, PR_GET_SECCOMP, PR_SET_SECCOMP});
+  allow("fcntl", 1, {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_GETLK, F_SETLK, F_SETLKW});
+  allow("ioctl", 1, {TCGETS, TIOCGWINSZ, FIONREAD, FIONBIO, FIOCLEX, FIONCLEX});
   return filter.install();
 }
 
@@ -152,28 +177,28 @@ bool drop_capabilities() {
   return ::syscall(SYS_capset, &header, sets.data()) == 0;
 }
 
-/// Leaves files outside the folder for temporary files as they are. Without Landlock (before Linux 5.13, or switched
-/// off) this does nothing. The headers of older distributions lack it, so its numbers stand here.
-void keep_files() {
+/// Leaves files outside the folder for temporary files as they are. False without Landlock (before Linux 5.13, or
+/// switched off). The headers of older distributions lack it, so its numbers stand here.
+bool keep_files() {
   constexpr long create_ruleset = 444;
   constexpr long add_rule = 445;
   constexpr long restrict_self = 446;
   constexpr unsigned ask_version = 1;
   constexpr int below_path = 1;
   const long version = ::syscall(create_ruleset, nullptr, 0, ask_version);
-  if (version < 1) return;
+  if (version < 1) return false;
   // Writing, removing and making files; from version 2 on moving them, from 3 on truncating them.
   std::uint64_t handled = 0x1FF2;
   if (version >= 2) handled |= 1U << 13U;
   if (version >= 3) handled |= 1U << 14U;
   const int rules = static_cast<int>(::syscall(create_ruleset, &handled, sizeof handled, 0));
-  if (rules < 0) return;
+  if (rules < 0) return false;
   struct __attribute__((packed)) Below {
     std::uint64_t allowed;
     std::int32_t folder;
   };
-  const auto allow = [&](const std::filesystem::path& path, std::uint64_t allowed) {
-    const Below below{.allowed = allowed, .folder = ::open(path.c_str(), O_PATH | O_CLOEXEC)};
+  const auto allow = [&](const std::filesystem::path& path, std::uint64_t rights) {
+    const Below below{.allowed = rights, .folder = ::open(path.c_str(), O_PATH | O_CLOEXEC)};
     if (below.folder < 0) return;
     static_cast<void>(::syscall(add_rule, rules, below_path, &below, 0));
     ::close(below.folder);
@@ -181,8 +206,9 @@ void keep_files() {
   allow(temporary_folder(), handled);
   allow("/dev/null", 0x2);
   static_cast<void>(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0));
-  static_cast<void>(::syscall(restrict_self, rules, 0));
+  const bool kept = ::syscall(restrict_self, rules, 0) == 0;
   ::close(rules);
+  return kept;
 }
 
 }  // namespace
@@ -192,11 +218,14 @@ std::filesystem::path temporary_folder() {
   return std::filesystem::absolute(given != nullptr && *given != '\0' ? given : "/tmp");
 }
 
-std::string confine(int socket) {
+std::string confine(int socket, bool files_unprotected) {
   const auto failed = [](const char* what) { return std::string(what) + ": " + std::strerror(errno); };
   static_cast<void>(::syscall(SYS_close_range, socket + 1, ~0U, 0));
   if (!limit_resources()) return failed("setrlimit");
-  keep_files();
+  if (!keep_files() && !files_unprotected) {
+    return "it has no Landlock, so that code could change every file of this user; boot with lsm=landlock, or accept "
+           "the risk with --set unsafe.foreign_files=true";
+  }
   if (!drop_capabilities()) return failed("capset");
   if (!catch_traps(socket) || !filter_calls()) return failed("seccomp");
   return {};

@@ -17,12 +17,13 @@ inline constexpr std::uint64_t host_threads_max = 256;                          
 [[nodiscard]] std::filesystem::path temporary_folder();
 
 /// From now on this process may use no more than the limits above; it may start no process, touch no other process,
-/// take no priority, open no socket and write no file outside the folder for temporary files (the last where the kernel
-/// has Landlock). What asks for a socket or a file gets an error, as honest code expects it. The other forbidden system
-/// calls end the process: it sends `HostRefusal` on `socket`. Descriptors above `socket` are
-/// closed, capabilities dropped. Holds for its threads to come. Works for root and without.
+/// take no priority, open no socket and write no file outside the folder for temporary files. System calls that are on
+/// no list fail with ENOSYS. What asks for a socket or a file gets an error, as honest code expects it. The forbidden
+/// system calls end the process: it sends `HostRefusal` on `socket`. Descriptors above `socket` are closed,
+/// capabilities dropped. Holds for its threads to come. Works for root and without.
+/// @param files_unprotected  go on where the kernel has no Landlock, which keeps the files
 /// Returns why the kernel cannot do that; empty if it can.
-[[nodiscard]] std::string confine(int socket);
+[[nodiscard]] std::string confine(int socket, bool files_unprotected);
 
 /// Name of a system call; "another one" for a number that is none.
 [[nodiscard]] std::string name_of_call(std::int32_t number);

@@ -150,8 +150,7 @@ class Linker {
     if (!unnamed.empty()) {
       problem(
           "its input{} \"{}\" ha{} no name of ours; write in the table [inputs] of control.foreign.mapping, a TOML "
-          "file: "
-          "\"{}\" = \"start\". In place of start give one of {}",
+          "file: \"{}\" = \"start\". In place of start give one of {}",
           unnamed.size() > 1 ? "s" : "", fmt::join(unnamed, "\", \""), unnamed.size() > 1 ? "ve" : "s",
           fmt::join(unnamed, "\" = \"start\", \""), known);
     }

@@ -20,6 +20,7 @@ struct ForeignSetup {
   std::filesystem::path folder{};   ///< of an extracted FMU
   std::filesystem::path mapping{};  ///< TOML file with an FMU's names; empty: none
   double period_s{0.0};
+  bool files_unprotected{false};                             ///< a person accepts that its code could change files
   std::vector<std::pair<std::string, double>> parameters{};  ///< keys of `control.` and `model.`
 };
 

@@ -16,6 +16,7 @@ namespace abs_hil::interchange {
 namespace {
 
 std::atomic<Home> chosen_home{Home::own_process};
+std::atomic<bool> unprotected_accepted{false};
 
 /// Trial steps of a warm-up: 2 s at 1 kHz.
 constexpr std::uint32_t trial_steps = 2000;
@@ -30,8 +31,10 @@ void add_numbers(const Options& options, const std::string& prefix,
 }
 
 ForeignSetup setup_of(const std::string& file, const control::ControllerContext& context) {
-  ForeignSetup setup{
-      .file = file, .mapping = context.options.foreign.mapping, .period_s = 1.0 / context.options.rate_Hz};
+  ForeignSetup setup{.file = file,
+                     .mapping = context.options.foreign.mapping,
+                     .period_s = 1.0 / context.options.rate_Hz,
+                     .files_unprotected = unprotected_accepted.load()};
   add_numbers(context.options, "control.", setup.parameters);
   add_numbers(context.rig, "model.", setup.parameters);
   return setup;
@@ -139,6 +142,9 @@ void register_foreign_controllers() {
   for (const control::ControllerFiles& files : foreign_controllers()) control::register_controller_files(files);
 }
 
-void set_home(Home home) noexcept { chosen_home.store(home); }
+void set_home(Home home, bool files_unprotected) noexcept {
+  chosen_home.store(home);
+  unprotected_accepted.store(files_unprotected);
+}
 
 }  // namespace abs_hil::interchange

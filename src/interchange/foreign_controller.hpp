@@ -95,6 +95,7 @@ void for_each_output(Foreign& foreign, Own& own, const Take& take) {
 [[nodiscard]] std::array<control::ControllerFiles, 4> foreign_controllers() noexcept;
 /// Lets the registry make them.
 void register_foreign_controllers();
-void set_home(Home home) noexcept;
+/// @param files_unprotected  a person accepts code that could change files, where the kernel has no Landlock
+void set_home(Home home, bool files_unprotected) noexcept;
 
 }  // namespace abs_hil::interchange

@@ -55,10 +55,11 @@ int run_host(const std::function<std::unique_ptr<ForeignCode>(const ForeignSetup
   packet.resize(static_cast<std::size_t>(size));
   std::unique_ptr<ForeignCode> code;
   try {
-    if (const std::string why = confine(host_socket); !why.empty()) {
+    const auto setup = nlohmann::json::parse(packet).get<ForeignSetup>();
+    if (const std::string why = confine(host_socket, setup.files_unprotected); !why.empty()) {
       throw std::runtime_error("this kernel cannot confine a controller from a file (" + why + ")");
     }
-    code = make(nlohmann::json::parse(packet).get<ForeignSetup>());
+    code = make(setup);
   } catch (const std::exception& error) {
     static_cast<void>(send_json({{"error", error.what()}}));
     return 2;

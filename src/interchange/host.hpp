@@ -16,7 +16,7 @@ namespace abs_hil::interchange {
 inline constexpr int host_socket = 3;
 inline constexpr std::size_t host_packet_max = 65'536;
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ForeignSetup, file, folder, mapping, period_s, parameters)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ForeignSetup, file, folder, mapping, period_s, files_unprotected, parameters)
 
 enum class HostAction : std::uint32_t {
   reset,

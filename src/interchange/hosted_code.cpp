@@ -22,6 +22,7 @@
 #include "driver/file_descriptor.hpp"
 #include "driver/spawn.hpp"
 #include "interchange/confinement.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"
 #include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
@@ -106,7 +107,8 @@ HostedCode::HostedCode(const ForeignSetup& setup) : HostedCode(setup.period_s) {
   }
   try {
     const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
-    if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
+    if (json.contains("error"))
+      throw std::invalid_argument(rig::clean_text(json.at("error").get<std::string>(), 2000, "\n"));
     json.at("signals").get_to(signals_);
     json.at("source").get_to(source_);
   } catch (const nlohmann::json::exception&) {
@@ -140,7 +142,8 @@ void HostedCode::pass_on_prints() noexcept {
     // A full pipe behind stderr must not stop the run.
     pollfd room{STDERR_FILENO, POLLOUT, 0};
     if (::poll(&room, 1, 0) != 1) continue;
-    static_cast<void>(!::write(STDERR_FILENO, text.data(), static_cast<std::size_t>(got)));
+    const std::string shown = rig::clean_text({text.data(), static_cast<std::size_t>(got)}, text.size(), "\n\t");
+    static_cast<void>(!::write(STDERR_FILENO, shown.data(), shown.size()));
     constexpr std::string_view enough = "\nabs_hil: the controller prints too much; the rest is left out\n";
     if (printed_ >= printed_max) static_cast<void>(!::write(STDERR_FILENO, enough.data(), enough.size()));
   }
@@ -219,7 +222,7 @@ bool HostedCode::ask(const HostRequest& request, HostAnswer& answer) noexcept {
   const bool crowded = all_steps_ % steps_between_looks == 0 && too_many_threads();
   if (got == static_cast<ssize_t>(sizeof answer) && !crowded) {
     answer.failure.back() = '\0';
-    failure_ = answer.failure.data();
+    failure_ = rig::clean_text(answer.failure.data(), answer.failure.size());
     return failure_.empty();
   }
   failure_ = fmt::format("its code {} in step {}", how_it_ended(crowded ? -1 : got, &answer), steps_);

@@ -123,8 +123,7 @@ void RunMonitor::end() {
     case guardian::GuardEnd::insisting:
       spdlog::error(
           "guardian: process {0} still tries to make the outputs safe and will report the result. Press the E-stop. "
-          "Once "
-          "the rig's power is off, kill -USR1 {0} ends its tries",
+          "Once the rig's power is off, kill -USR1 {0} ends its tries",
           pid);
   }
 }

@@ -17,6 +17,7 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "driver/monotonic_time.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "program/first_place.hpp"
 #include "program/subcommands.hpp"
@@ -26,6 +27,7 @@ namespace abs_hil::program {
 
 namespace {
 
+using guardian::BoardOwner;
 constexpr double most_insist_s = 3600.0;
 
 /// Options of `abs_hil safe` as typed.
@@ -147,7 +149,7 @@ std::vector<std::vector<std::string>> files_of(const std::vector<Seen>& boards) 
 
 /// The owners of the boards; none if that takes too long.
 std::optional<std::vector<BoardOwner>> find_owners(const ZeroWriting& zeros) {
-  auto found = in_background([files = files_of(zeros.seen())] { return owners_of(files); });
+  auto found = in_background([files = files_of(zeros.seen())] { return guardian::owners_of(files); });
   if (!is_there(found, owners_found_within_ms)) return std::nullopt;
   return found.get();
 }
@@ -174,7 +176,7 @@ std::vector<BoardOwner> end_all_owners(const ZeroWriting& zeros, std::vector<std
     }
     std::erase_if(*owners, [&met](const BoardOwner& owner) { return is_one_of(met, owner); });
     if (owners->empty()) break;
-    end_owners(*owners, must_go);
+    guardian::end_owners(*owners, must_go);
     met.insert(met.end(), owners->begin(), owners->end());
   }
   return met;

@@ -51,7 +51,7 @@ int send(const SendOptions& options) {
           "this answer is not authenticated: anybody on the network could have sent it; give the run and send the "
           "same key with --set commands.key_file=FILE, or look at the rig");
     }
-    return exit_completed;
+    return reply.authentic ? exit_completed : exit_ended_early;
   }
   cli::print(stderr, "abs_hil: {}\n", reply.message);
   return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -62,26 +60,5 @@ class ZeroWriting {
 
   std::shared_ptr<State> state_;
 };
-
-/// A process that has a board open.
-struct BoardOwner {
-  pid_t pid{0};
-  std::string name{};
-  std::size_t board{0};  ///< which one
-  bool ended{false};
-  bool killed{false};  ///< with SIGKILL
-};
-
-/// The processes that have one of the files of a board open, as far as this user may see them. Without this process,
-/// and without guardians, which write zeros only. Opens no file of theirs, asks no file system about one, and reads
-/// nothing for which a process would have to be responsive.
-/// @param files  of each board
-[[nodiscard]] std::vector<BoardOwner> owners_of(const std::vector<std::vector<std::string>>& files);
-
-/// Ends processes that drive boards, all at once, and waits for their ends, at most 2.5 s. Each is asked to stop in
-/// order and killed if it is stopped, still lives after a second, or must not be waited for.
-/// @param must_go  tells whether that board's owner must be killed now; `asked_ns` is when it was asked (monotonic)
-void end_owners(std::vector<BoardOwner>& owners,
-                const std::function<bool(std::size_t board, std::int64_t asked_ns)>& must_go);
 
 }  // namespace abs_hil::program

@@ -313,17 +313,18 @@ RunOutcome Run::run_realtime(const Poll& poll) {
   }
   try {
     driver_.configure();
+    std::int64_t start_ns = -1;
+    if (second_offset_ns_ >= 0) {
+      start_ns = next_second_ns(clock_.now_ns() + start_margin_ns) + second_offset_ns_;
+      executive_.start_at(start_ns);
+      clock_.sleep_until(start_ns - rig::ns_per_s / 2);  // the guard expects the first cycle within a second
+    }
     if (guard_ != nullptr) {
       guard_->arm(realtime_.scheduling);
       driver_.tell_before_making_safe(guard_);
     }
-    std::int64_t start_ns = clock_.now_ns();
-    if (second_offset_ns_ >= 0) {
-      start_ns = next_second_ns(start_ns + start_margin_ns) + second_offset_ns_;
-      executive_.start_at(start_ns);
-    }
     // The time of a simulated rig begins with the first cycle.
-    driver_.activate(start_ns);
+    driver_.activate(start_ns < 0 ? clock_.now_ns() : start_ns);
   } catch (...) {
     driver_.tell_before_making_safe(nullptr);
     go.set_value(false);

@@ -173,7 +173,7 @@ def not_enabled(folder):
     found, said = send('slip-ref', '0.2')
     check(found == 3 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
     stop = subprocess.run([PROGRAM, 'send', 'stop'], capture_output=True, text=True, timeout=30)
-    check(stop.returncode == 0 and 'stop accepted' in stop.stdout and 'not authenticated' in stop.stderr, 'stop needs no key',
+    check(stop.returncode == 1 and 'stop accepted' in stop.stdout and 'not authenticated' in stop.stderr, 'stop needs no key',
           stop)
     check(run.end() == 1, 'stop ends the run')
     found, said = send('--timeout', '0.5', 'stop')
@@ -184,14 +184,14 @@ def forged():
     """A forger in place of a run answers each stop, with no tag or with the tag of another answer."""
     ear, wire, words = Ear(), Wire(), [PROGRAM, 'send', 'stop', '--timeout', '2']
     for tag in ('', f' [mac {"0" * 64}]'):
-        for key, status, text in (([], 0, 'not authenticated'), (KEY, 3, 'no authentic answer')):
+        for key, status, text in (([], 1, 'not authenticated'), (KEY, 3, 'no authentic answer')):
             sender = subprocess.Popen([*words, *key], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             stop = next(ear.heard('ABS_COMMAND', 5))
             answer = abs_hil.event_t()
-            answer.kind, answer.reason, answer.message = 'command', 34, f"stop accepted (sender '{stop.sender}'){tag}"
+            answer.kind, answer.reason, answer.message = 'command', 34, f"stop accepted \x1b[2J (sender '{stop.sender}'){tag}"
             wire.message(b'ABS_EVENT', answer.encode())
             said = ''.join(sender.communicate(timeout=30))
-            check(sender.returncode == status and text in said, f'a forged answer {"with" if key else "without"} a key', said)
+            check(sender.returncode == status and text in said and '\x1b' not in said, f'a forged answer {"with" if key else "without"} a key', said)
             list(ear.heard('ABS_COMMAND', 0.2))  # the repeated ones
 
 

@@ -1,6 +1,7 @@
 """The paper's experiment through driver.kind=hm2, against the emulated 7I92T in another process: in lock-step it agrees with
 the simulator; in real time the board's watchdog ends what nobody else can. Outcomes and the board's own clock are asserted,
 never this computer's timing."""
+import contextlib
 import json
 import os
 import pathlib
@@ -8,6 +9,7 @@ import re
 import signal
 import socket
 import subprocess
+import threading
 import time
 import unittest
 
@@ -32,6 +34,35 @@ class Board(EmulatorProcess):
     def __init__(self, folder, *args):
         self.address = f'127.0.0.1:{free_port()}'
         super().__init__(folder, '--hm2', self.address, *args)
+
+
+class WithoutMark(threading.Thread):
+    """A board without an emulator's mark: passes datagrams on to an emulator, and takes the mark out of its answers."""
+
+    def __init__(self, board, host):
+        super().__init__(daemon=True)
+        self.here, self.there = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self.here.bind((host, 0))
+        self.there.connect(('127.0.0.1', int(board.address.split(':')[1])))
+        for one in (self.here, self.there):
+            one.settimeout(0.02)
+        self.over = False
+        self.address = f'{host}:{self.here.getsockname()[1]}'
+        self.start()
+
+    def end(self):
+        self.over = True
+        self.join()
+        self.here.close()
+        self.there.close()
+
+    def run(self):
+        while not self.over:
+            with contextlib.suppress(TimeoutError):
+                asked, client = self.here.recvfrom(2000)
+                self.there.send(asked)
+                answer = self.there.recv(2000)
+                self.here.sendto(answer.replace(b'\x05\x5a', b'\0\0') if b'\x82\x75' in asked else answer, client)
 
 
 class Hm2Run(EmulatorTest):
@@ -94,12 +125,33 @@ class Hm2Run(EmulatorTest):
         result = self.lock_step(board, '--summary', rig)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('not verified on hardware', result.stderr)
+        self.assertIn('an emulator: no commissioning record is asked for', result.stderr)
         self.assertIn('0 without an answer in time; 0 writes lost', result.stderr)
         r, s = self.summary(rig), self.summary(sim)
         self.assertEqual(r['telemetry_drops'], 0)
         for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
             self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
         self.assertEqual(board.wire(), SAFE)
+
+    def test_a_board_without_the_mark_is_no_emulator(self):
+        """Neither at this computer's own address nor where driver.emulated says so."""
+        other = '10.77.64.1'
+        subprocess.run(['ip', 'address', 'add', f'{other}/32', 'dev', 'lo'], check=False)
+        board = self.board()
+        claimed = ('--set', 'driver.emulated=true')
+        for host, keys in (('127.0.0.1', ()), ('127.0.0.1', claimed), (other, claimed), ('127.0.0.1', (*claimed, '--fast'))):
+            with self.subTest(host=host, keys=keys):
+                real = WithoutMark(board, host)
+                self.addCleanup(real.end)
+                result = self.run_program(*self.arguments(real, *keys))
+                self.assertEqual(result.returncode, 2, result.stderr)
+                self.assertIn("carries no emulator's mark", result.stderr)
+        real = WithoutMark(board, other)
+        self.addCleanup(real.end)
+        result = self.run_program(*self.arguments(real))
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn('commission', result.stderr)
+        self.assertIn('writes 0', board.command('status'))
 
     def test_latency_measures_the_wire_of_a_board_that_gets_only_zeros(self):
         board = self.board()

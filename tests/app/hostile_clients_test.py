@@ -79,14 +79,38 @@ def enough(measure):
 
 
 class ForeignWriter:
-    """Another process with a handle on the card."""
+    """Another process with a handle on the card. The service ends it in the end; then there is a new one."""
+    PROGRAM = f"""
+import os, struct, sys, time
+card = os.open(sys.argv[1], os.O_RDWR)
+for line in sys.stdin:
+    print(time.monotonic_ns(), flush=True)
+    for offset, value in zip(({PWM_INDEX}, {PWM_WIDTH}), map(int, line.split())):
+        os.pwrite(card, struct.pack('<I', value), offset)
+    print('written', flush=True)
+"""
 
     def __init__(self, emulator):
-        self.file = os.open(next(emulator.root.glob('*/resource2')), os.O_RDWR)
+        self.card = next(emulator.root.glob('*/resource2'))
+        self.process = None
 
     def write(self, pwm, width):
-        for offset, value in ((PWM_INDEX, pwm), (PWM_WIDTH, width)):
-            os.pwrite(self.file, struct.pack('<I', value), offset)
+        """When it wrote, by its own clock."""
+        while True:
+            if self.process is None or self.process.poll() is not None:
+                self.process = subprocess.Popen([sys.executable, '-c', self.PROGRAM, self.card], text=True, bufsize=1,
+                                                stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            with contextlib.suppress(BrokenPipeError):
+                self.process.stdin.write(f'{pwm} {width}\n')
+                began, written = self.process.stdout.readline(), self.process.stdout.readline()
+                if written:
+                    return int(began)
+            self.process.wait()
+
+    def __del__(self):
+        if self.process is not None:
+            self.process.kill()
+            self.process.communicate()
 
 
 class HostileTest(ResidentTest):
@@ -95,8 +119,7 @@ class HostileTest(ResidentTest):
     def foreign_duty(self, emulator, writer, pwm=0):
         """ms until it is gone, by the card's clock."""
         with not_held_up():
-            before_ns = time.monotonic_ns()
-            writer.write(pwm, 3000)
+            before_ns = writer.write(pwm, 3000)
         wait_until(lambda: emulator.widths().zero_since_ns is not None, 'a foreign duty stays on')
         return max(0, emulator.widths().zero_since_ns - before_ns) * 1e-6
 
@@ -199,20 +222,98 @@ class ZeroUnlessCovered(HostileTest):
         service.end()
         return times
 
+    def test_foreign_duty_between_the_cover_and_the_first_cycle(self):
+        self.hold(lambda: enough(self.duties_before_the_first_cycle), 'foreign duty, covered and not cycling', 20)
+
+    def duties_before_the_first_cycle(self):
+        """Of a run that begins 0.9 s after a whole second, and is covered from 0.4 s on."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        writer = ForeignWriter(emulator)
+        time.sleep(-time.monotonic() % 1)
+        begins = round(time.monotonic()) + 1.9
+        program = subprocess.Popen(
+            [pathlib.Path(PROGRAM).resolve(), 'latency', '--backend', 'rig', '--duration', '0.1', '--secaligned', '900000',
+             *settings(f'driver.pci.root={emulator.root}', 'guardian.resident=require', f'guardian.socket={service.socket}',
+                       'guardian.timeout_ms=500')], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self._programs.append(program)
+        wait_until(lambda: 'lease granted' in service.said(), 'no lease')
+        self.assertLess(time.monotonic(), begins - 1, 'this computer is too slow')
+        times = []
+        for before_s in (0.4, 0.3, 0.2):
+            time.sleep(max(0, begins - before_s - time.monotonic()))
+            times.append(self.foreign_duty(emulator, writer))
+            self.assertLess(time.monotonic(), begins)
+        program.wait(timeout=20)
+        service.end()
+        return times
+
     def test_service_writes_zeros_first(self):
         """Before its socket, its companions and its log."""
         emulator = self.emulator()
         writer = ForeignWriter(emulator)
 
         def start():
-            writer.write(0, 3000)
-            before_ns = time.monotonic_ns()
+            before_ns = writer.write(0, 3000)
             self.service(emulator)
             zero_after_ns = emulator.widths().zero_since_ns - before_ns
             self.services[-1].end()
             self.assertGreater(zero_after_ns, 0)
             return zero_after_ns * 1e-6
         self.hold(lambda: [start() for _ in range(TRIES)], 'start of the service to zeros, fork and exec included', 20)
+
+
+class ForeignWriters(HostileTest):
+    DRIVES = f"""
+import os, signal, struct, sys, time
+manner = sys.argv[2]
+if manner == 'stubborn':
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+card = os.open(sys.argv[1], os.O_RDWR)
+while True:
+    for offset, value in (({PWM_INDEX}, 0), ({PWM_WIDTH}, 3000)):
+        os.pwrite(card, struct.pack('<I', value), offset)
+    time.sleep(0.0001 if manner == 'eager' else 0.001)
+"""
+
+    def time_on(self, manner, ended_by):
+        """ms, by the card's clock."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        log = self.folder / 'changes'
+        emulator.command(f'changes {log}')
+        writer = subprocess.Popen([sys.executable, '-c', self.DRIVES, next(emulator.root.glob('*/resource2')), manner])
+        try:
+            self.assertEqual(writer.wait(timeout=20), ended_by)
+        finally:
+            writer.kill()
+        wait_until(lambda: f'process {writer.pid} (' in service.said(), 'not said')
+        self.assertIn('drove the board without being guarded, and was ended', service.said())
+        wait_until(lambda: emulator.wire() == SAFE, 'the board stays on')
+        emulator.command('changes off')
+        rows = [tuple(map(float, line.split())) for line in log.read_text().splitlines()]
+        on_ns = sum(after[0] - row[0] for row, after in zip(rows, rows[1:]) if any(row[1:]))
+        self.assertGreater(on_ns, 0)
+        service.end()
+        emulator.end()
+        return on_ns * 1e-6
+
+    def test_a_foreign_writer_is_found_and_ended(self):
+        for manner, ended_by in (('mild', -signal.SIGTERM), ('eager', -signal.SIGTERM), ('stubborn', -signal.SIGKILL)):
+            self.hold(lambda manner=manner, ended_by=ended_by: [self.time_on(manner, ended_by) for _ in range(TRIES)],
+                      f'{manner} foreign writer, on in all', 100)
+
+    def test_a_holder_is_suspected_last(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        with lease(service, emulator) as (client, _):
+            open_card = os.open(next(emulator.root.glob('*/resource2')), os.O_RDWR)
+            writer = ForeignWriter(emulator)
+            while 'and was ended' not in service.said():
+                self.foreign_duty(emulator, writer)
+                time.sleep(0.02)  # many in a row count as the holder's
+            os.close(open_card)
+        self.assertNotRegex(service.said(), rf'process {os.getpid()} \S+ drove')
 
 
 class HostileClients(HostileTest):
@@ -368,6 +469,25 @@ class HostileClients(HostileTest):
         self.assertIn(forged, service.said())  # within a line
         self.assertFalse([line for line in service.said().splitlines() if line.startswith(forged)])
         self.assertNotIn('\x1b', service.said())
+
+    def test_clients_cannot_fill_the_log(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        began = time.monotonic()
+        for _ in range(2500):  # each refusal is a line of the log
+            with connect(service.socket) as client:
+                send(client, ASK, b'another board', [os.pidfd_open(os.getpid())])
+                receive(client)
+        lines = service.said().count('refused a lease')
+        self.assertGreaterEqual(lines, 1000)
+        self.assertLessEqual(lines, 2000 + time.monotonic() - began)
+
+        def left_out():
+            with connect(service.socket) as client:
+                send(client, ASK, b'another board', [os.pidfd_open(os.getpid())])
+                receive(client)
+            return 'left out ' in service.said()
+        wait_until(left_out, 'it does not say how many lines it left out')
 
     def test_full_log_holds_nobody_up(self):
         """Nobody reads the pipe that is the service's stderr."""

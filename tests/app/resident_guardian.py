@@ -91,11 +91,15 @@ class Service:
             stdout=subprocess.DEVNULL, stderr=open(self.log, 'a'))  # noqa: SIM115
         wait_until(lambda: 'grants leases at' in self.said() or self.process.poll() is not None, 'no service')
 
+    def companions(self):
+        """Standby and talker."""
+        return [int(pid) for pid in pathlib.Path(
+            f'/proc/{self.process.pid}/task/{self.process.pid}/children').read_text().split()]
+
     def stop(self):
         """SIGSTOP to all of it: its standby would end a guard that stands still."""
-        children = pathlib.Path(f'/proc/{self.process.pid}/task/{self.process.pid}/children').read_text().split()
-        for process in (*children, self.process.pid):
-            os.kill(int(process), signal.SIGSTOP)
+        for process in (*self.companions(), self.process.pid):
+            os.kill(process, signal.SIGSTOP)
 
     def said(self):
         return self.log.read_text()

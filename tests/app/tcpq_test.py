@@ -59,7 +59,7 @@ def clients(program, folder):
           watch.returncode, watch.stdout, watch.stderr)
     stop = subprocess.run([program, 'send', 'stop', '--timeout', '20', '--lcm-url', URL], capture_output=True, text=True,
                           timeout=60)
-    check(stop.returncode == 0 and 'stop accepted' in stop.stdout, 'abs_hil send stop', stop)
+    check(stop.returncode == 1 and 'stop accepted' in stop.stdout, 'abs_hil send stop', stop)
     run.process.communicate(timeout=60)
     check(run.process.returncode == 1, 'send stop ends the run', run.process.returncode)
     server.end()

@@ -58,6 +58,11 @@ TEST_CASE(
   CHECK(board.answer(many).size() == 2 * 127 * 4);
 }
 
+TEST_CASE("An emulator carries its mark in space 5, in lock-step with the sizes that the space takes") {
+  CHECK(ask(*hm2_board({}), "82750000") == hex("055A 0000"));
+  CHECK(ask(*hm2_board({.lock_step = true}), "82750000") == hex("055A 0F81"));
+}
+
 TEST_CASE("In lock-step only a write of all of space 5 advances the time") {
   const auto made_board = hm2_board({.lock_step = true});
   UdpBoard& board = *made_board;

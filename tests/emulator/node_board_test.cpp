@@ -89,13 +89,13 @@ TEST_CASE("In lock-step the host advances the node's time, alone or before other
   CHECK(node.answer(hex("82D60000 40420F0000000000")).empty());
   CHECK(node.time_ns() == 1 * ms);
   CHECK(node.answer(hex("82560000")) == hex("40420F0000000000"));
-  CHECK(node.answer(hex("01750000")) == hex("055A"));
+  CHECK(node.answer(hex("82750000")) == hex("055A 0F00"));
   CHECK(node.answer(hex("82D60000 80841E0000000000 01510000")) == hex("D007"));
-  CHECK(node.answer(hex("01510000 82560000 01750000 01510000")) == hex("D007 80841E0000000000 055A D007"));
+  CHECK(node.answer(hex("01510000 82560000 82750000 01510000")) == hex("D007 80841E0000000000 055A0F00 D007"));
   const auto made_real = node_board({});
   UdpBoard& real = *made_real;
   CHECK(real.answer(hex("82560000")) == Bytes(8, 0));
-  CHECK(real.answer(hex("01750000")) == Bytes(2, 0));
+  CHECK(real.answer(hex("82750000")) == hex("055A 0000"));  // the mark of an emulator, which keeps its own time
   CHECK(real.time_ns() == 0);
   CHECK_THROWS_WITH(node_board({.name = ""}), Contains("1 to 16"));
 }

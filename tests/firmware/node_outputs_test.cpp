@@ -173,7 +173,7 @@ TEST_CASE("The latch holds: DDR and status do not bring outputs back while a val
   node.write(0x1100, 2);
   node.set_duty(0, 1000);
   CHECK_FALSE(node.drives(0));  // the bite has disarmed it
-  node.poll(50'000);
+  node.poll(25'000);            // within 20 ms of its opening
   CHECK(node.read(0x0D00) == 0);
   node.write(0x0C00, 499'999);
   CHECK(node.duty(0) == 1000);
@@ -270,4 +270,101 @@ TEST_CASE("Switching the armed watchdog off bites, a time below a us too; unarme
   node.write(0x0E00, 0x005A0000);
   node.poll(5'001);
   CHECK(node.read(0x0D00) == 1);
+}
+
+TEST_CASE("A latch that was opened closes again if the watchdog is not armed within 20 ms") {
+  for (const std::uint32_t arms_at_us : {19'999U, 20'000U}) {
+    Node node;
+    node.poll(0xFFFFF000U);  // the clock wraps meanwhile
+    for (const std::uint32_t i : {0U, 4U}) {
+      node.write(0x1200 + i, 2);
+      node.write(0x4100 + i, 3);
+    }
+    node.write(0x0D00, 0);
+    for (const std::uint32_t i : {0U, 4U}) node.write(0x1100 + i, 2);
+    node.write(0x4000, 1024U << 16);
+    CHECK(node.duty(0) == 0);
+    node.poll(0xFFFFF000U + arms_at_us);
+    node.write(0x0C00, 499'999);
+    node.feed();  // of anybody
+    const bool in_time = arms_at_us < 20'000;
+    CHECK(node.drives(0) == in_time);
+    CHECK(node.duty(0) == (in_time ? 1024 : 0));
+    CHECK(node.read(0x0D00) == (in_time ? 0 : 1));
+    if (!in_time) CHECK(node.read(0x1100) == 0);
+  }
+}
+
+namespace {
+
+/// Activated by a host that numbers its datagrams; its last number was 8, and duty 0 is 1024.
+struct Owned : Node {
+  Owned() {
+    activate();
+    CHECK(ask("82D1 1400 07000000").empty());
+    CHECK(ask("81C2 0040 00000004 82D1 1400 08000000").empty());
+    REQUIRE(duty(0) == 1024);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("While its owner numbers its datagrams, nobody feeds or drives without the next number") {
+  for (const char* datagram : {
+           "81C2 000E 0000005A",                     // a feed
+           "81C2 000C 1FA10700",                     // another time for the watchdog, which loads it
+           "81C2 0040 00000005",                     // another duty
+           "81C2 0440 00000004",                     // the other duty
+           "81C2 0041 02000000",                     // a mode in which the value means another duty
+           "81C2 0042 FF000000",                     // another frequency
+           "81C2 0011 03000000",                     // a further pin
+           "81C2 0040 00000000 81C2 000E 0000005A",  // zero, and a feed
+       }) {
+    CAPTURE(datagram);
+    Owned node;
+    node.poll(4'000);
+    CHECK(node.ask(datagram).empty());
+    CHECK(node.duty(0) == 1024);
+    CHECK(node.duty(1) == 0);
+    CHECK((node.errors() & 4U) != 0);
+    node.poll(5'000);  // the armed time since the owner's last word: nobody has fed
+    CHECK_FALSE(node.drives(0));
+    Owned numbered;
+    numbered.ask(std::string(datagram) + " 82D1 1400 09000000");
+    CHECK((numbered.errors() & 4U) == 0);
+  }
+}
+
+TEST_CASE("Nobody but the owner switches a PWM pin on") {
+  Owned node;
+  node.ask("81C2 0411 00000000 82D1 1400 09000000");
+  REQUIRE_FALSE(node.drives(1));
+  node.ask("81C2 0411 02000000");
+  CHECK_FALSE(node.drives(1));
+  CHECK((node.errors() & 4U) != 0);
+}
+
+TEST_CASE("Anybody may make the node safe, and read, also while it has an owner") {
+  for (const char* datagram : {"81C2 0040 00000000", "81C2 000C 01000000", "81C2 000C 00000080", "81C2 0011 00000000",
+                               "82C2 0040 0000000000000000 81C2 000C 01000000"}) {
+    CAPTURE(datagram);
+    Owned node;
+    CHECK(node.ask(datagram).empty());
+    CHECK(node.duty(0) == 0);
+    CHECK(node.errors() == 0);
+  }
+  Owned node;
+  CHECK(node.ask("8142 0040").size() == 4);
+  CHECK(node.duty(0) == 1024);
+}
+
+TEST_CASE("A host that sends no numbers drives as before") {
+  Node node;
+  node.activate();
+  node.set_duty(0, 1024);
+  node.poll(4'000);
+  node.feed();
+  node.poll(8'000);
+  CHECK(node.duty(0) == 1024);
+  CHECK(node.errors() == 0);
 }

@@ -1,4 +1,6 @@
 // The guardian as a process: hand-over, delays, and the end of its run.
+#include <arpa/inet.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -7,6 +9,7 @@
 #include <fstream>
 
 #include "catch.hpp"
+#include "guardian/board_owners.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/linux_process.hpp"
 #include "temporary_folder.hpp"
@@ -71,6 +74,42 @@ TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
   guardian.outputs_released(true);
   CHECK(guardian.end() == GuardEnd::failed);
   CHECK(guardian.pages().run().stage.load() == Stage::closed);
+}
+
+TEST_CASE("the processes that have a file open, or a socket to a UDP peer, are found and ended") {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.path / "board";
+  std::ofstream(file) << "registers";
+  const driver::FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_in peer{
+      .sin_family = AF_INET, .sin_port = htons(27181), .sin_addr = {htonl(INADDR_LOOPBACK)}, .sin_zero = {}};
+  REQUIRE(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&peer), sizeof peer) == 0);
+  const std::vector<std::vector<std::string>> boards{{"udp:0100007F:6A2D"}, {file}, {"udp:0100007F:6A2E"}, {"udp:"}};
+  CHECK(owners_of(boards).empty());  // this process is none
+  for (const bool by_socket : {true, false}) {
+    std::array<int, 2> ready{-1, -1};
+    REQUIRE(::pipe(ready.data()) == 0);
+    const pid_t owner = ::fork();
+    if (owner == 0) {
+      std::signal(SIGTERM, SIG_DFL);
+      if (!by_socket) ::dup2(::open(file.c_str(), O_RDWR), socket.get());
+      static_cast<void>(!::write(ready[1], "", 1));
+      ::pause();
+      ::_exit(0);
+    }
+    char byte = 0;
+    REQUIRE(::read(ready[0], &byte, 1) == 1);
+    auto owners = owners_of(boards);
+    REQUIRE(owners.size() == 1);
+    CHECK(owners.front().pid == owner);
+    CHECK(owners.front().board == (by_socket ? 0 : 1));
+    end_owners(owners, [](std::size_t, std::int64_t) { return false; });
+    CHECK(owners.front().ended);
+    CHECK_FALSE(owners.front().killed);
+    CHECK(::waitpid(owner, nullptr, 0) == owner);
+    ::close(ready[0]);
+    ::close(ready[1]);
+  }
 }
 
 }  // namespace

@@ -217,3 +217,104 @@ TEST_CASE("the report of a run that dies after it released its outputs says when
   CHECK(service.said(NewsWord::ended) != nullptr);
   CHECK_FALSE(service.guard.over());
 }
+
+TEST_CASE("a foreign duty between the cover and the first cycle is gone within 20 ms") {
+  const std::int64_t after_ns = GENERATE(0, 7 * ms, 14'900 * us, 15'100 * us, 400 * ms, 900 * ms);
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  const std::int64_t from_ns = service.clock.now_ns() + after_ns;
+  std::int64_t on_ns = 0;
+  service.happens = [&](std::int64_t now_ns) {
+    if (now_ns == from_ns) service.board.duty = 0.8;
+    if (service.board.duty > 0.0) on_ns += 100 * us;
+  };
+  if (after_ns == 0) service.board.duty = 0.8;
+  service.pass(after_ns + 40 * ms);
+  CAPTURE(after_ns, on_ns);
+  CHECK(on_ns > 0);
+  CHECK(on_ns <= 20 * ms);
+  CHECK(service.processes.lives(run_process));
+}
+
+TEST_CASE("between the cover and the first cycle the board is looked at only after the run has taken it over") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  const std::size_t from = service.story.size();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  service.pass(14 * ms);
+  CHECK(service.story.size() == from);
+  service.pass(500 * ms);
+  CHECK(service.count("look", from) >= 90);
+  CHECK(service.count("write", from) == 0);
+  service.board.shared = false;  // a board that cannot be looked at beside its owner
+  const std::size_t then = service.story.size();
+  service.pass(100 * ms);
+  CHECK(service.story.size() == then);
+}
+
+TEST_CASE("a holder whose board is driven again and again before its first cycle is ended") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  service.happens = [&](std::int64_t) { service.board.duty = 0.8; };
+  const std::int64_t from_ns = service.clock.now_ns();
+  while (service.processes.lives(run_process) && service.clock.now_ns() < from_ns + 100 * ms) service.pass(ms);
+  CHECK(service.clock.now_ns() - from_ns <= 30 * ms);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  CHECK(service.said(NewsWord::acted)->report.reason == Reason::foreign_writer);
+}
+
+TEST_CASE("a holder that begins no cycle within a second of the cover is ended") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  REQUIRE(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+  service.pass(990 * ms);
+  CHECK(service.processes.lives(run_process));
+  service.pass(20 * ms);
+  CHECK_FALSE(service.processes.lives(run_process));
+}
+
+TEST_CASE("the guard says that somebody drives without a cover after five looks, at any pace, and while it lasts") {
+  const std::int64_t every_ms = GENERATE(1, 10, 200, 5'000);
+  Service service;
+  service.guard.begin();
+  std::int64_t on_ns = 0;
+  service.happens = [&](std::int64_t now_ns) {
+    if (now_ns % (every_ms * ms) == 0) service.board.duty = 0.5;
+    if (service.board.duty > 0.0) on_ns += 100 * us;
+  };
+  const std::int64_t from_ns = service.clock.now_ns();
+  while (!service.guard.driven_by_others()) {
+    service.pass(ms);
+    REQUIRE(service.clock.now_ns() - from_ns <= 5 * every_ms * ms + 20 * ms);
+  }
+  CAPTURE(every_ms);
+  CHECK(on_ns <= 30 * ms);
+  service.happens = {};
+  service.pass(50 * ms);
+  CHECK_FALSE(service.guard.driven_by_others());
+}
+
+TEST_CASE("a board that comes back with a duty is no foreign writer, nor is a run that is covered") {
+  Service service;
+  service.guard.begin();
+  for (int time = 0; time < 5; ++time) {
+    service.board.duty = 0.5;
+    service.pass(50 * ms);
+    CHECK(service.board.duty == 0.0);
+    CHECK_FALSE(service.guard.driven_by_others());
+    service.pass(61'000 * ms);
+  }
+  static_cast<void>(service.covered());
+  service.pass(2 * ms);
+  for (int look = 0; look < 100; ++look) {
+    service.board.duty = 0.5;
+    service.pass(ms);
+    REQUIRE_FALSE(service.guard.driven_by_others());
+  }
+}

@@ -1,6 +1,7 @@
 // The guard of the resident service: leases, and the board while no run is covered.
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "guardian/linux_process.hpp"
@@ -328,7 +329,7 @@ TEST_CASE("an order ends the guard's wait, also one in the mail that has replace
   for (int talker = 0; talker < 3; ++talker) {
     REQUIRE(service.mail.order({.word = OrderWord::look}));
     const std::int64_t before_ns = service.clock.now_ns();
-    wait_for_guard(service.guard, service.clock);
+    wait_for_guard(service.guard, service.clock, {-1, -1});
     CHECK(service.clock.now_ns() == before_ns);
     service.guard.look();
     service.mail = Mail();
@@ -341,6 +342,19 @@ TEST_CASE("a broken descriptor does not end the guard's wait") {
   REQUIRE(::fcntl(service.guard.holder(), F_GETFD) < 0);
   const std::int64_t next_ns = service.guard.next_ns();
   REQUIRE(next_ns > service.clock.now_ns());
-  wait_for_guard(service.guard, service.clock);
+  wait_for_guard(service.guard, service.clock, {-1, -1});
   CHECK(service.clock.now_ns() == next_ns);
+}
+
+TEST_CASE("a companion's end ends the guard's wait") {
+  Service service;
+  service.pass(0);
+  const pid_t ends = ::fork();
+  if (ends == 0) ::_exit(0);
+  const driver::FileDescriptor process(open_pidfd(ends));
+  REQUIRE(service.guard.next_ns() > service.clock.now_ns());
+  const std::int64_t before_ns = service.clock.now_ns();
+  wait_for_guard(service.guard, service.clock, {-1, process.get()});
+  CHECK(service.clock.now_ns() == before_ns);
+  CHECK(::waitpid(ends, nullptr, WNOHANG) == ends);
 }

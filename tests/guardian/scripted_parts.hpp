@@ -115,6 +115,7 @@ class ScriptedBoard final : public driver::SafeStateWriter {
     return {driver::IoError::foreign_writer, 0x6C};
   }
   [[nodiscard]] bool works_beside_owner() const noexcept override { return shared; }
+  [[nodiscard]] bool tells_duties() const noexcept override { return shared; }
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override { return 300 * ms; }
   void let_go() noexcept override { held = refuses_owners = false; }
   void take_hold() noexcept override { refuses_owners = true; }

@@ -43,13 +43,13 @@ TEST_CASE("a silent controller is noticed within the timeout and one look, where
   }
 }
 
-TEST_CASE("before the first cycle a missing heartbeat is no fault for ten seconds") {
+TEST_CASE("before the first cycle a missing heartbeat is no fault for a second") {
   Watchdog watchdog(timeout_ns, period_ns);
   std::int64_t now_ns = 0;
   while (watchdog.look({.now_ns = now_ns += period_ns, .cycle_beats = 0}) == Verdict::wait) {
-    REQUIRE(now_ns < 11'000 * ms);
+    REQUIRE(now_ns < 1'100 * ms);
   }
-  CHECK(now_ns >= Watchdog::first_beat_ns);
+  CHECK(now_ns >= 1'000 * ms);
   CHECK(watchdog.reason() == rig::Reason::controller_silent);
 }
 

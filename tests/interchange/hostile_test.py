@@ -2,9 +2,12 @@
 (status 1) in a step, with a reason; the program, its files and other processes are unharmed. Controllers in the program's own
 process end it with status 1 at worst. FMUs and files that would fill memory or stack are refused before that.
 usage: as in foreign.py, and then the program of own_hostile.cpp"""
+import ctypes
+import errno
 import os
 import pathlib
 import resource
+import struct
 import subprocess
 import sys
 import time
@@ -24,7 +27,7 @@ DEEDS = {'FORK_BOMB': FORBIDDEN, 'DAEMON': FORBIDDEN, 'CLONE_RAW': '(clone)', 'S
          'SIGNALS_BY_OWNER': '(fcntl)', 'LEAVES_PARENT': '(prctl)', 'TRACES': '(ptrace)', 'LIMITS_PARENT': '(prlimit64)',
          'PRIORITY': '(sched_setscheduler)', 'NAMESPACE': '(unshare)', 'THREADS': 'threads', 'MEMORY': 'Segmentation fault',
          'SHARED_MEMORY': 'Segmentation fault', 'SEGMENT': 'Aborted', 'BIG_FILE': 'File size limit exceeded',
-         'DELETES': 'Aborted', 'CLOSES': 'closed its connection', 'FORGES': 'an answer of', 'PRINTS': 'did not answer in time',
+         'DELETES': 'Aborted', 'SWEEP': 'Aborted', 'ESCAPES': 'Aborted', 'CLOSES': 'closed its connection', 'FORGES': 'an answer of', 'PRINTS': 'did not answer in time',
          'STOPS_ITSELF': 'did not answer in time', 'EXITS': 'ended its process with status 0',
          'EXITS_AT_ONCE': 'ended its process with status 0', 'EXITS_QUICKLY': 'ended its process with status 0',
          'ENDS_THREAD': 'Aborted', 'ABORTS': 'Aborted', 'LOOPS': 'did not answer in time',
@@ -45,19 +48,54 @@ def with_environment(text):
     return found
 
 
+def facts_of(file):
+    """All that a system call could change of it, but the time of reading."""
+    facts = file.stat()
+    return (file.read_text(), facts.st_mode, facts.st_uid, facts.st_gid, facts.st_nlink, facts.st_mtime_ns, facts.st_ctime_ns,
+            os.listxattr(file))
+
+
+def without_landlock():
+    """Called in a child: the kernel answers as one without Landlock."""
+    load_number, jump_equal, give, landlock_create_ruleset = 0x20, 0x15, 0x06, 444
+    code = b''.join(struct.pack('HBBI', *statement) for statement in (
+        (load_number, 0, 0, 0), (jump_equal, 0, 1, landlock_create_ruleset), (give, 0, 0, 0x00050000 | errno.ENOSYS),
+        (give, 0, 0, 0x7FFF0000)))
+    statements = ctypes.create_string_buffer(code, len(code))
+    program = struct.pack('HxxxxxxP', len(code) // 8, ctypes.addressof(statements))
+    libc = ctypes.CDLL(None, use_errno=True)
+    no_new_privileges, set_seccomp, filter_mode = 38, 22, 2
+    if libc.prctl(no_new_privileges, 1, 0, 0, 0) != 0 or libc.prctl(set_seccomp, filter_mode, program, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), 'prctl')
+
+
 class Hostile(ProgramTest):
+    def test_without_landlock_a_person_must_accept_that_files_may_change(self):
+        library = hostile(self.folder, 'ABORTS', 'AT_STEP=1000000')
+        run = [PROGRAM, '--controller', library, '--fast', '--no-lcm', '--no-out', '--set',
+               'experiment.start_speed_rad_s=20']
+        refused = subprocess.run(run, capture_output=True, text=True, preexec_fn=without_landlock, timeout=60)
+        self.assertEqual(refused.returncode, 2, refused.stderr)
+        self.assertIn('no Landlock', refused.stderr)
+        self.assertIn('unsafe.foreign_files=true', refused.stderr)
+        for consent, enter in ((['--set', 'unsafe.foreign_files=true'], without_landlock), ([], None)):
+            accepted = subprocess.run(run + consent, capture_output=True, text=True, preexec_fn=enter, timeout=60)
+            self.assertIn(accepted.returncode, (0, 1), accepted.stderr)
+            self.assertNotIn('Landlock', accepted.stderr)
+
     def attack(self, library, *options):
         """Status, standard error; every process that the code started is gone, and nobody holds our pipe."""
         kept = pathlib.Path('/var/tmp', f'{library.stem}-{os.getpid()}')  # outside the folder for temporary files
         kept.write_text('dear to somebody')
-        mode = kept.stat().st_mode
+        before = facts_of(kept)
         mark = {'HOSTILE_FILE': str(kept), 'HOSTILE_BIG_FILE': str(self.folder / 'big')}
         try:
             program = subprocess.Popen([PROGRAM, '--controller', library, '--fast', '--no-lcm', '--set',
                                         'experiment.start_speed_rad_s=170', *map(str, options)], text=True,
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **mark})
             _, errors = program.communicate(timeout=60)  # returns when nobody holds the pipes any more
-            self.assertEqual((kept.read_text(), kept.stat().st_mode), ('dear to somebody', mode))
+            self.assertEqual(facts_of(kept), before)
+            self.assertNotRegex(errors, r'[\x00-\x08\x0b-\x1f\x7f-\x9f]')
             self.assertEqual(with_environment(f'HOSTILE_FILE={kept}'.encode()), [])
         finally:
             kept.unlink(missing_ok=True)

@@ -92,6 +92,7 @@ struct Backend {
   std::function<BoardReality(const BoardOptions&)> reality{};
   std::function<std::vector<FoundBoard>(const BoardOptions&)> find{};
   std::function<void(const BoardOptions&, const RunFacts&)> check{};
+  std::function<std::string(const BoardOptions&)> udp_peer{};
   std::vector<std::string_view> free_options{};
 };
 
@@ -115,6 +116,8 @@ struct BackendRow {
   std::vector<FoundBoard> (*find)(const Options&) = nullptr;
   /// Checks options against the run. Throws std::invalid_argument. Null: nothing to check.
   void (*check)(const Options&, const RunFacts&) = nullptr;
+  /// Of a board that is reached by UDP: its address and port as /proc/net/udp has them, to find foreign writers.
+  std::string (*udp_peer)(const Options&) = nullptr;
   /// Names of options that say where the board is, or how patient the driver is. A commissioning of the board holds for
   /// any value of these, and only for the values of all others that it had. Caps may also be lower.
   std::vector<std::string_view> free_options = {};
@@ -155,6 +158,7 @@ Backend backend(const BackendRow<Options>& row, Options defaults) {
   if (row.reality != nullptr) entry.reality = with(row.reality);
   if (row.find != nullptr) entry.find = with(row.find);
   if (row.check != nullptr) entry.check = with(row.check);
+  if (row.udp_peer != nullptr) entry.udp_peer = with(row.udp_peer);
   entry.free_options = row.free_options;
   return entry;
 }

@@ -38,6 +38,8 @@ class SafeStateWriter {
   [[nodiscard]] virtual IoResult verify_safe() noexcept { return make_safe(); }
   /// True if it can look at the outputs while another process has the board open, without disturbing that one.
   [[nodiscard]] virtual bool works_beside_owner() const noexcept { return false; }
+  /// True if it does so, and tells duties from outputs that its owner has only permitted.
+  [[nodiscard]] virtual bool tells_duties() const noexcept { return false; }
   /// Lets an owner in: closes a handle that would keep it from the board. The next call opens the board again.
   virtual void let_go() noexcept {}
   /// Keeps new owners away again.

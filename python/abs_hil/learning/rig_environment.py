@@ -92,6 +92,8 @@ class RigSlipControl(Braking):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         asked = float(np.clip(np.asarray(action, dtype=np.float64).reshape(-1)[0], 0.0, 1.0))
+        if not np.isfinite(asked):
+            raise ValueError('action: give a number in [0, 1]')
         if self._process is None:
             raise RuntimeError('the run has ended: call reset')
         began = self._values()

@@ -49,22 +49,23 @@ OpenLink opener(const Hm2Options& options) {
   return [address = parse_address(options.address)] { return std::make_unique<UdpLink>(address); };
 }
 
-std::unique_ptr<RigDriver> make_driver(const Hm2Options& options, const RunFacts& run) {
-  Hm2Options hm2 = options;
-  hm2.encoder_counts_per_rev = run.encoder_counts_per_rev;
-  hm2.rate_Hz = run.rate_Hz;
-  return std::make_unique<Hm2Driver>(hm2, opener(hm2), monotonic_ns, run.lock_step);
-}
-
-std::unique_ptr<SafeStateWriter> make_writer(const Hm2Options& options, const RunFacts& /*run*/) {
-  return safe_state_writer(options, opener(options));
-}
-
-/// Nothing but an emulator answers at this computer's own address.
+/// This computer's own address is an emulator's, which has to show its mark.
 BoardReality reality(const Hm2Options& options) {
   constexpr std::uint32_t loopback = 127;
   const std::uint32_t address = ntohl(parse_address(options.address).sin_addr.s_addr);
   return {.reality = address >> 24U == loopback ? Reality::emulator : Reality::unknown};
+}
+
+std::unique_ptr<RigDriver> make_driver(const Hm2Options& options, const RunFacts& run) {
+  Hm2Options hm2 = options;
+  hm2.encoder_counts_per_rev = run.encoder_counts_per_rev;
+  hm2.rate_Hz = run.rate_Hz;
+  const bool must_be_marked = run.emulated || reality(options).reality == Reality::emulator;
+  return std::make_unique<Hm2Driver>(hm2, opener(hm2), monotonic_ns, run.lock_step, must_be_marked);
+}
+
+std::unique_ptr<SafeStateWriter> make_writer(const Hm2Options& options, const RunFacts& /*run*/) {
+  return safe_state_writer(options, opener(options));
 }
 
 void check(const Hm2Options& options, const RunFacts& run) {
@@ -94,11 +95,13 @@ Packet safe_packet(const Board& board, const RegisterPair& pwm) noexcept {
   return packet;
 }
 
-Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step)
+Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step,
+                     bool must_be_marked)
     : BoardDriver(output_grid(options), lock_step ? nullptr : read_clock),
       options_(options),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
+      must_be_marked_(must_be_marked),
       answer_timeout_ns_(answer_timeout_ns("driver.hm2.", options, answer_share)) {
   check_options("driver.hm2.", options);
 }
@@ -109,7 +112,12 @@ void Hm2Driver::do_configure() {
   read_number_ = static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 16U;
   const bool was_on = outputs_at_usual_place();
   board_ = read_board(*link_, options_.address, read_number_);
-  // A board in real time is not asked: what hardware answers there is not known.
+  if (must_be_marked_ && mark() == Mark::none) {
+    throw std::invalid_argument(
+        "driver.hm2.address = " + options_.address +
+        ": this board carries no emulator's mark, so it counts as a real one; remove driver.emulated, and give it an "
+        "address of a network of its own (docs/hm2.md)");
+  }
   if (lock_step_) require_lock_step("the hm2 board at " + options_.address, true, waits_for_time());
   pins_ = find_pins(board_, options_);
   const std::uint32_t rate = pwm_rate(options_, board_);
@@ -151,14 +159,19 @@ bool Hm2Driver::outputs_at_usual_place() noexcept {
   return ask(*link_, packet, answer, read_number_) && (word32(answer, where) | word32(answer, where + 4)) != 0;
 }
 
-bool Hm2Driver::waits_for_time() {
-  constexpr std::uint16_t cookie = 0x5A00 | space::lock_step;
+Hm2Driver::Mark Hm2Driver::mark() {
+  constexpr std::uint16_t cookie = 0x5A00 | space::emulator;
   Packet packet;
-  const std::size_t cookie_at = packet.read(space::info | space::lock_step, 0);
-  std::array<std::uint8_t, 2> answer{};
-  if (!ask(*link_, packet, answer, read_number_) || word16(answer, cookie_at) != cookie) return false;
+  const std::size_t at = packet.read(space::info | space::emulator, 0, 2);
+  std::array<std::uint8_t, 4> answer{};
+  if (!ask(*link_, packet, answer, read_number_) || word16(answer, at) != cookie) return Mark::none;
+  return word16(answer, at + 2) != 0 ? Mark::lock_step : Mark::real_time;  // the sizes that the space takes
+}
+
+bool Hm2Driver::waits_for_time() {
+  if (mark() != Mark::lock_step) return false;
   Packet time;
-  time.read(space::lock_step, 0, 2);
+  time.read(space::emulator, 0, 2);
   std::array<std::uint8_t, 8> ns{};
   if (!ask(*link_, time, ns, read_number_)) return false;
   emulated_ns_ = told_ns_ = static_cast<std::int64_t>(word32(ns, 0) | std::uint64_t{word32(ns, 4)} << 32U);
@@ -323,6 +336,11 @@ Backend hm2_backend() {
       .outputs = output_grid,
       .reality = reality,
       .check = check,
+      .udp_peer =
+          [](const Hm2Options& options) {
+            const sockaddr_in peer = parse_address(options.address);
+            return formatted("%08X:%04X", peer.sin_addr.s_addr, static_cast<unsigned>(ntohs(peer.sin_port)));
+          },
       .free_options = {"address", "answer_timeout_us", "plausible_speed_rad_s"},
   });
 }

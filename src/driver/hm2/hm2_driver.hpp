@@ -48,7 +48,8 @@ class Hm2Driver final : public BoardDriver {
   /// @param open_link   called by `configure`; throws Unavailable
   /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
   /// @param lock_step   this driver advances the time of the board, which must be an emulator in lock-step
-  Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock = nullptr, bool lock_step = false);
+  Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock = nullptr, bool lock_step = false,
+            bool must_be_marked = false);
   ~Hm2Driver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "hm2"; }
@@ -103,6 +104,9 @@ class Hm2Driver final : public BoardDriver {
   [[nodiscard]] bool outputs_at_usual_place() noexcept;
   /// True for an emulator that waits for its time; `emulated_ns_` becomes that.
   [[nodiscard]] bool waits_for_time();
+  enum class Mark : std::uint8_t { none, real_time, lock_step };
+  /// What an emulator carries on the wire, and no board on the market.
+  [[nodiscard]] Mark mark();
   IoResult judge(const CycleAnswer& answer) noexcept;
   IoResult judge_talkers(const CycleAnswer& answer) noexcept;
   IoResult take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept;
@@ -118,6 +122,7 @@ class Hm2Driver final : public BoardDriver {
   Hm2Options options_;
   OpenLink open_link_;
   bool lock_step_;
+  bool must_be_marked_;
   std::int64_t answer_timeout_ns_;
   double stamp_tick_ns_{0.0};
 

@@ -27,7 +27,7 @@ void Packet::put(std::uint32_t value, unsigned bytes) noexcept {
 
 namespace {
 
-bool has_32_bit(unsigned space) noexcept { return space == space::hostmot2 || space == space::lock_step; }
+bool has_32_bit(unsigned space) noexcept { return space == space::hostmot2 || space == space::emulator; }
 
 }  // namespace
 
@@ -50,7 +50,7 @@ void Packet::write32(std::uint16_t address, std::span<const std::uint32_t> value
 }
 
 void Packet::write_time(std::uint64_t time_ns) noexcept {
-  command(true, space::lock_step, 2, 0, true);
+  command(true, space::emulator, 2, 0, true);
   put(static_cast<std::uint32_t>(time_ns), 4);
   put(static_cast<std::uint32_t>(time_ns >> 32U), 4);
 }

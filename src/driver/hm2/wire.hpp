@@ -30,7 +30,7 @@ namespace space {
 inline constexpr unsigned hostmot2 = 0;  ///< 32 bit
 inline constexpr unsigned eeprom = 2;    ///< these and all below: 16 bit
 inline constexpr unsigned timers = 4;
-inline constexpr unsigned lock_step = 5;  ///< of emulators in lock-step alone: their time, ns, in two of 32 bit
+inline constexpr unsigned emulator = 5;  ///< no hardware has it; in lock-step: the time, ns, in two of 32 bit
 inline constexpr unsigned status = 6;
 inline constexpr unsigned board_info = 7;
 inline constexpr unsigned info = 8;  ///< with one of them: about that space, from its cookie on, 16 bit

@@ -22,6 +22,7 @@ class PciSafeState final : public OwnHandleWriter<std::unique_ptr<RegisterWindow
     if (!handle_) refuse("the card has just been looked for, and was not there");
   }
   [[nodiscard]] bool works_beside_owner() const noexcept override { return true; }
+  [[nodiscard]] bool tells_duties() const noexcept override { return true; }
   /// Stays at the card, and lets an owner in.
   void let_go() noexcept override {
     if (handle_) handle_->refuse_owners(false);

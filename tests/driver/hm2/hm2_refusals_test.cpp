@@ -122,6 +122,17 @@ TEST_CASE("Options that the board cannot have are refused, naming the key") {
   CHECK(ntohs(hm2::parse_address("10.0.0.1:5000").sin_port) == 5000);
 }
 
+TEST_CASE("A board without an emulator's mark is none, whatever its address and driver.emulated say") {
+  RegisterBoard board;
+  Cable cable(board);
+  Hm2Driver claimed({}, cable.opener(), nullptr, false, true);
+  CHECK_THROWS_AS(claimed.configure(), std::invalid_argument);  // status 2
+  CHECK_THROWS_WITH(claimed.configure(), Contains("carries no emulator's mark") && Contains("driver.emulated"));
+  CHECK(board.writes == 0);
+  Hm2Driver real({}, cable.opener());
+  CHECK_NOTHROW(real.configure());
+}
+
 TEST_CASE("The safe-state writer drops all outputs beside a stopped owner, whether or not it is answered") {
   for (const bool answered : {true, false}) {
     Rig rig;

@@ -206,7 +206,9 @@ function duties() {
 function silence() {
   const node = duties();
   const fed = node.now;
-  node.net.deliver(hex('81C2000E 0000005A'));
+  node.net.deliver(hex('81C2000E 0000005A 82D11400 06000000'));
+  node.pass(2e6);
+  node.net.deliver(hex('81C2000E 0000005A')); // without a number: not of the owner, and no feed
   assert.ok(node.run(() => !node.drives(DRIVE) && !node.drives(BRAKE), 30e6), 'the outputs stay on');
   const late_ms = (node.now - fed) / 1e6 - 5;
   told(`silence: pins are inputs ${(late_ms * 1e3).toFixed(1)} us after the armed 5 ms, counted from the last reload on the wire`);

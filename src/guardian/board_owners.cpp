@@ -1,7 +1,10 @@
 // Finds the process that has a board open, by the files below /proc.
+#include "guardian/board_owners.hpp"
+
 #include <dirent.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,17 +12,21 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <sstream>
+#include <string_view>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
+#include "guardian/guard.hpp"
 #include "guardian/linux_process.hpp"
-#include "program/zero_writing.hpp"
 #include "rig/formatted_text.hpp"
 
-namespace abs_hil::program {
+namespace abs_hil::guardian {
 
 namespace {
 
@@ -36,7 +43,8 @@ struct FileId {
 /// What the kernel remembers of the file: a file system that hangs is not asked.
 std::optional<FileId> id_of(int folder, const char* name) {
   struct statx found {};
-  if (::statx(folder, name, AT_STATX_DONT_SYNC | AT_NO_AUTOMOUNT, STATX_INO, &found) != 0) return std::nullopt;
+  const int flags = AT_STATX_DONT_SYNC | AT_NO_AUTOMOUNT | AT_EMPTY_PATH;
+  if (::statx(folder, name, flags, STATX_INO, &found) != 0) return std::nullopt;
   return FileId{found.stx_dev_major, found.stx_dev_minor, found.stx_ino};
 }
 
@@ -53,6 +61,37 @@ std::string text_of(int in, const std::string& name) {
   std::array<char, 256> text{};
   const ssize_t got = file.get() < 0 ? 0 : ::read(file.get(), text.data(), text.size());
   return {text.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+}
+
+constexpr std::string_view udp = "udp:";
+
+/// The sockets of this computer that are connected to a UDP peer, as the kernel's table names it.
+void add_sockets_to(std::string_view peer, std::vector<FileId>& found) {
+  const FileDescriptor any(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const auto socket_id = id_of(any.get(), "");  // all sockets are on one device
+  if (!socket_id) return;
+  std::ifstream table("/proc/self/net/udp");
+  for (std::string line; std::getline(table, line);) {
+    std::istringstream words(line);
+    std::string word, remote;
+    std::uint64_t inode = 0;
+    words >> word >> word >> remote;
+    for (int i = 0; i < 6; ++i) words >> word;  // state, queues, timer, retransmissions, user, timeout
+    if (remote == peer && words >> inode) found.push_back({socket_id->major, socket_id->minor, inode});
+  }
+}
+
+/// A guardian or `abs_hil safe` of this installation. Any process can take their names. The program of another user's
+/// process cannot be seen by all; then the name counts.
+bool writes_zeros_only(int proc, const std::string& pid, std::string_view name) {
+  std::error_code error;
+  const std::filesystem::path guardian = std::filesystem::weakly_canonical(guardian_program(), error);
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/" + pid + "/exe", error);
+  if (error) return name == "abs_guardian";
+  if (program.string().starts_with(guardian.string())) return true;  // " (deleted)" follows after an upgrade
+  constexpr std::string_view safe("\0safe\0", 6);
+  return program.parent_path() == guardian.parent_path() &&
+         text_of(proc, pid + "/cmdline").find(safe) != std::string::npos;
 }
 
 struct FileOfBoard {
@@ -80,15 +119,29 @@ bool is_stopped(pid_t pid) {
 }
 
 /// False if the process may not be ended.
-bool send(int pidfd, int signal) { return guardian::send_signal(pidfd, signal) || errno != EPERM; }
+bool send(int pidfd, int signal) { return send_signal(pidfd, signal) || errno != EPERM; }
 
 }  // namespace
+
+std::vector<std::string> files_of_board(const driver::DriverOptions& options) {
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
+  std::vector<std::string> files;
+  if (chosen.entry.udp_peer) files.push_back(std::string(udp) + chosen.entry.udp_peer(chosen.options));
+  if (!chosen.entry.find) return files;
+  for (const driver::FoundBoard& board : chosen.entry.find(chosen.options)) {
+    files.insert(files.end(), board.files.begin(), board.files.end());
+  }
+  return files;
+}
 
 std::vector<BoardOwner> owners_of(const std::vector<std::vector<std::string>>& files) {
   std::vector<FileOfBoard> wanted;
   for (std::size_t board = 0; board < files.size(); ++board) {
     for (const std::string& file : files[board]) {
-      if (const auto id = id_of(AT_FDCWD, file.c_str())) wanted.push_back({*id, board});
+      std::vector<FileId> ids;
+      if (file.starts_with(udp)) add_sockets_to(std::string_view(file).substr(udp.size()), ids);
+      if (const auto id = id_of(AT_FDCWD, file.c_str())) ids.push_back(*id);
+      for (const FileId& id : ids) wanted.push_back({id, board});
     }
   }
   std::vector<BoardOwner> owners;
@@ -102,7 +155,8 @@ std::vector<BoardOwner> owners_of(const std::vector<std::vector<std::string>>& f
     if (!board) continue;
     std::string name = text_of(::dirfd(proc.get()), number + "/comm");
     if (name.ends_with('\n')) name.pop_back();
-    if (name != "abs_guardian") owners.push_back({.pid = *pid, .name = name, .board = *board});
+    if (!writes_zeros_only(::dirfd(proc.get()), number, name))
+      owners.push_back({.pid = *pid, .name = name, .board = *board});
   }
   return owners;
 }
@@ -120,14 +174,14 @@ void end_owners(std::vector<BoardOwner>& owners,
   const std::int64_t asked_ns = driver::monotonic_ns();
   std::vector<Process> left;
   for (BoardOwner& owner : owners) {
-    left.push_back({owner, FileDescriptor(guardian::open_pidfd(owner.pid))});
+    left.push_back({owner, FileDescriptor(open_pidfd(owner.pid))});
     owner.ended = left.back().pidfd.get() < 0 && errno == ESRCH;
     if (!is_stopped(owner.pid)) left.back().refused = !send(left.back().pidfd.get(), SIGTERM);
   }
   for (std::int64_t now_ns = asked_ns; now_ns < asked_ns + give_up_ns; now_ns = driver::monotonic_ns()) {
     bool done = true;
     for (auto& [owner, pidfd, refused] : left) {
-      if (!owner.ended) owner.ended = guardian::has_ended(pidfd.get());
+      if (!owner.ended) owner.ended = has_ended(pidfd.get());
       if (owner.ended || refused) continue;
       done = false;
       if (owner.killed) continue;
@@ -139,4 +193,4 @@ void end_owners(std::vector<BoardOwner>& owners,
   }
 }
 
-}  // namespace abs_hil::program
+}  // namespace abs_hil::guardian
