@@ -188,7 +188,7 @@ class LanesOf : public Lanes {
   static WindowKernel kernel_of(study::lanes::InstructionSet set) {
     using Kind = plant_sim::lanes::WindowKind<Tyre, Load>;
     using plant_sim::lanes::window_kernel;
-#if defined(__x86_64__)
+#ifdef ABS_HIL_WIDE_LANES
     if (set == study::lanes::InstructionSet::avx512) return window_kernel<rig::Avx512, Kind>();
     if (set == study::lanes::InstructionSet::avx2) return window_kernel<rig::Avx2, Kind>();
 #endif

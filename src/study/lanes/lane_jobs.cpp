@@ -183,7 +183,7 @@ struct KindOf {
   }
 
   using Types = LaneKind<Law, Tyre, Load>;
-#if defined(__x86_64__)
+#ifdef ABS_HIL_WIDE_LANES
   static constexpr std::array<LaneKernel (*)(), 4> kernels{
       nullptr, lane_kernel<rig::Portable, Types>, lane_kernel<rig::Avx2, Types>, lane_kernel<rig::Avx512, Types>};
 #else
@@ -252,7 +252,7 @@ void assist(void* runs, const AssistedCycle& cycle, double* state, double* condi
 
 InstructionSet instruction_set() {
   InstructionSet widest = InstructionSet::portable;
-#if defined(__x86_64__)
+#ifdef ABS_HIL_WIDE_LANES
   if (__builtin_cpu_supports("avx2") != 0) widest = InstructionSet::avx2;
   if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0)
     widest = InstructionSet::avx512;
