@@ -18,12 +18,14 @@
 #include <utility>
 
 #include "control.hpp"
-#include "driver/pci/wire.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::program {
 
 namespace {
+
+/// In lock-step: the card's time, ns, 8 bytes.
+constexpr const char* time_file = "emulated_time_ns";
 
 /// One file of the tree below the card's folder.
 struct ServedFile {
@@ -47,7 +49,7 @@ std::vector<ServedFile> files_of(const EmulatorOptions& options) {
                                 {.name = "resource", .content = none + none + bar2 + none + none + none + none},
                                 {.name = "resource2", .bytes = options.bar_bytes, .registers = true, .mode = 0600}};
   if (options.lock_step) {
-    files.push_back({.name = driver::pci::emulated_time_file, .bytes = 8, .registers = true, .mode = 0600});
+    files.push_back({.name = time_file, .bytes = 8, .registers = true, .mode = 0600});
   }
   return files;
 }
@@ -160,7 +162,7 @@ class EmulatedCard final : public EmulatedBoard {
   }
   [[nodiscard]] int open() const { return permission_denied_ ? -EACCES : 0; }
   [[nodiscard]] int read(std::string_view name, std::uint64_t offset, void* data, std::size_t size) {
-    if (name == driver::pci::emulated_time_file) {
+    if (name == time_file) {
       const std::int64_t time_ns = model_.time_ns();
       if (offset != 0 || size != sizeof time_ns) return -EINVAL;
       std::memcpy(data, &time_ns, sizeof time_ns);
@@ -177,7 +179,7 @@ class EmulatedCard final : public EmulatedBoard {
     return sizeof result.value;
   }
   [[nodiscard]] int write(std::string_view name, std::uint64_t offset, const void* data, std::size_t size) {
-    if (name == driver::pci::emulated_time_file) {
+    if (name == time_file) {
       std::int64_t time_ns = 0;
       if (offset != 0 || size != sizeof time_ns) return -EINVAL;
       std::memcpy(&time_ns, data, sizeof time_ns);

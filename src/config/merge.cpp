@@ -88,8 +88,8 @@ void set_names(Settings& s, const Sources& sources) {
   s.plant_name = s.model_name;
 }
 
-/// What nobody has set of the rig's identity comes from the file that it names: from its [plant], which describes a
-/// rig, before its [model].
+/// Keys of the rig's identity that nobody has set come from the file that it names: first from its [plant], which
+/// describes a rig, then from its [model].
 void complete_identity(const Settings& s, KeyTable& keys) {
   const std::vector<FileValue> values = read_file(plant_file(s.rig.source, "rig.identity"), Tables::of_plant);
   for (const std::string_view table : {"plant.", "model."}) {

@@ -25,8 +25,8 @@
 //
 // Friction has jumped when the quick force differs from the curve's, F, for `jump_confirm_s` by more than
 //   max(jump_least_N, jump_share peak force) + jump_slip_m_s F / (v peak slip) + the swing of the quick force,
-// of which the second is what an error of the slip does on the rising curve. For `jump_hold_s` then nothing is learnt
-// but one factor of all heights: theta <- theta (1 + (1 - exp(-h / jump_time_constant_s)) r / F).
+// where the second term is what an error of the slip does on the rising curve. Then, for `jump_hold_s`, only one factor
+// of all heights is learnt: theta <- theta (1 + (1 - exp(-h / jump_time_constant_s)) r / F).
 #pragma once
 
 #include <array>

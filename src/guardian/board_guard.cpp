@@ -20,7 +20,7 @@ constexpr std::int64_t quick_pause_ns = 1'000'000;
 constexpr std::int64_t slow_pause_ns = 10'000'000;
 constexpr std::int64_t last_tries_ns = 1'000'000'000;
 constexpr int looks_to_believe = 2;
-/// So long a board may show nothing, as after a lost datagram, before its outputs count as given to the guard.
+/// A board may show nothing for this long, as after a lost datagram. Then its outputs count as given to the guard.
 constexpr std::int64_t blind_most_ns = 100'000'000;
 /// A holder whose board shows duties again and again drives it without being watched. A single one may be another's.
 constexpr int foreign_duty_weighs = 2;

@@ -45,7 +45,7 @@ class GuardianLease final : public Guard {
   bool armed_{false};
 };
 
-/// What the resident service says to somebody who is no run.
+/// What the resident service answers to a caller that is not a run.
 struct ServiceAnswer {
   pid_t service{0};
   bool answered{false};

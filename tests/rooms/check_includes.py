@@ -3,7 +3,8 @@
 
 The compiler already refuses headers of rooms that a room does not list (cmake/Room.cmake). This check finds what the
 compiler cannot find: includes of the backend `driver/sim`, which is in the folder of `driver`; of libraries that a room
-does not link; of clocks, threads and files in rooms that only compute; of private headers in public ones.
+does not link; of clocks, threads and files in rooms that only compute; of private headers in public ones; of what a driver
+knows about its board in the emulators' program, which has to know it by itself.
 
 usage: check_includes.py ROOT ROOMS.TSV              checks ROOT/include/abs_hil and ROOT/src
        check_includes.py ROOT ROOMS.TSV --self-test  plants one offence of each kind and checks that each is found
@@ -21,6 +22,8 @@ LIBRARIES = {
 }
 # Rooms that compute and never look at a clock, a thread, a file or a terminal
 PURE = {'rig', 'control', 'plant_sim'}
+# What the emulators' program may have of the drivers: nothing about a board
+OF_DRIVERS = {'driver/file_descriptor.hpp', 'driver/monotonic_time.hpp'}
 IMPURE_HEADER = re.compile(r'^(chrono|ctime|time\.h|thread|mutex|fstream|iostream|filesystem|unistd\.h|fcntl\.h|sys/.*)$')
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
@@ -74,6 +77,9 @@ def offences(root, rooms):
                     found.append(f'{place}: room {room} must not know {other}: {name}')
                 elif base.name == 'abs_hil' and not name.startswith('abs_hil/'):
                     found.append(f'{place}: a public header must not need a private one: {name}')
+    for file in sorted((root / 'apps/abs_rig_emulator').rglob('*.[ch]pp')):
+        names = re.findall(r'^#include "((?:abs_hil/)?driver/[^"]+)"', file.read_text(), re.MULTILINE)
+        found += [f'{file}: an emulator must know its board by itself: {name}' for name in names if name not in OF_DRIVERS]
     return found
 
 
@@ -84,7 +90,7 @@ def self_test(rooms):
                if other != room and other not in known and other not in ('driver_sim', 'lcmtypes')]
     planted += [('src/experiment', 'driver/sim/sim_driver.hpp'), ('src/control', 'chrono'), ('src/control', 'fmt/format.h'),
                 ('src/driver', 'lcm/lcm-cpp.hpp'), ('src/report', 'abs_hil/event_t.hpp'), ('src/nowhere', 'vector'),
-                ('include/abs_hil/control', 'control/adaptive_gains.hpp')]
+                ('include/abs_hil/control', 'control/adaptive_gains.hpp'), ('apps/abs_rig_emulator', 'driver/pci/wire.hpp')]
     missed = []
     for folder, include in planted:
         with tempfile.TemporaryDirectory() as copy:

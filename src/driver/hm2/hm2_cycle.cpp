@@ -70,7 +70,7 @@ IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
     ++counters_.writes_lost;
     command_ = commands_[answer.write_number % commands_.size()];
     bucket_.lost();
-    // Once that has ended the run, an answer is one again: else a board that is back would stay silent to its reader.
+    // After the run has ended for it, an answer counts again. Otherwise a board that is back would seem silent.
     if (bucket_.tripped() && fault_.ok()) return silent(at::write_number);
   } else {
     bucket_.good();
@@ -108,14 +108,14 @@ std::int64_t Hm2Driver::time_of(const CycleAnswer& answer, std::int64_t sent_ns,
   return std::clamp(last_.time_ns + interval_us * rig::ns_per_us, sent_ns, std::max(sent_ns, received_ns));
 }
 
-// A stamp wraps after 65,536 ticks: that of a new edge is clear while less time has passed since the answer before.
+// A stamp wraps after 65,536 ticks. It is unambiguous if less time has passed since the last answer.
 std::int32_t Hm2Driver::edge_age_ns(const CycleAnswer& answer, std::size_t wheel, bool moved, std::int64_t since_ns,
                                     std::int32_t before_ns) const noexcept {
   constexpr double wrap_ticks = 65536.0;
   const auto stamp = static_cast<std::uint16_t>(answer.count[wheel] >> 16U);
   const bool same_stamp = stamp == raw_counts_[wheel] >> 16U;
   if (!moved) {
-    // An edge to and fro: which of the two was last is not known.
+    // The wheel crossed an edge and came back: the stamp does not tell which crossing was the last.
     if (!same_stamp || before_ns < 0) return rig::no_edge_age;
     const std::int64_t age_ns = before_ns + since_ns;
     return age_ns <= std::numeric_limits<std::int32_t>::max() ? static_cast<std::int32_t>(age_ns) : rig::no_edge_age;
