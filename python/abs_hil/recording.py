@@ -29,6 +29,9 @@ _FOREIGN = {b'PK\x03\x04': 'a ZIP archive, as the own files of spreadsheets are:
             b'\x28\xb5\x2f\xfd': 'compressed: decompress it first (unzstd)', b'\xfd7zXZ': 'compressed: decompress it first (unxz)'}
 #: columns of a converted log that say where a row came from
 FROM_LOG = ('log_event', 'log_time_us', 'channel', 'type')
+#: notes on a run that lost nothing
+NO_CSV = 'no run.csv: the rows are those of run.lcmlog'
+NO_SUMMARY = 'no summary.json: names, figures and configuration are unknown'
 #: a run's messages count from 0, and none makes more
 _LAST_NUMBER = 10 ** 13
 
@@ -91,14 +94,14 @@ def load(path: PathLike) -> Run:
     run = load(rows)
     run.folder, run.name = place, place.resolve().name
     if rows.suffix == '.lcmlog':
-        run.notes.append('no run.csv: the rows are those of run.lcmlog')
+        run.notes.append(NO_CSV)
     elif (place / 'summary.json').exists():
         try:
             run.summary = read_object(place / 'summary.json')
         except ValueError as error:
             run.notes.append(f'summary.json is not used: {error}')
     else:
-        run.notes.append('no summary.json: names, figures and configuration are unknown')
+        run.notes.append(NO_SUMMARY)
     return run
 
 

@@ -16,7 +16,7 @@ from ..core import _core
 from ..files import parse_json, write_whole
 from ..messages import PHASES, QUANTITIES, decode
 from ..options import failed
-from ..recording import FROM_LOG, LOG, kind_of, load, named, read_events, read_log
+from ..recording import FROM_LOG, LOG, NO_CSV, NO_SUMMARY, kind_of, load, named, read_events, read_log
 from ..rows import check_times
 from ..run import COLUMNS, Run, csv_bytes
 from .messages import CYCLE_TOPIC, EVENT_TOPIC, SIGNALS_TOPIC, McapFile
@@ -50,7 +50,7 @@ def read(path: str) -> Run:
     if missing := [name for name in COLUMNS if name not in run.columns]:
         raise ValueError(f'"{path}" has no column {missing[0]}: an older version wrote it. Convert its event log')
     run.losses = list(dict.fromkeys([*missing_rows(run), *run.losses]))
-    run.losses += [note for note in run.notes if not note.startswith(('no run.csv', 'no summary.json'))]
+    run.losses += [note for note in run.notes if note not in (NO_CSV, NO_SUMMARY)]
     if pathlib.Path(path).is_dir():
         _read_folder(pathlib.Path(path), run)
     if run.events and 'events.csv' not in run.attachments:

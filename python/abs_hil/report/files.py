@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import _core
 from ..files import parse_toml
-from ..recording import CSV, kind_of, load, named, read_events, run_names, runs_in_series
+from ..recording import CSV, NO_CSV, kind_of, load, named, read_events, run_names, runs_in_series
 from ..run import Event, Run, flattened, names_apart, read_object, read_text
 from .text import DASH, clean, number_text
 
@@ -146,7 +146,7 @@ def _load_run(path: pathlib.Path) -> RunFiles:
         run = RunFiles(path / ('run.csv' if (path / 'run.csv').exists() else 'run.lcmlog'), _base_name(path))
         _read_folder(run, path)
         if not (path / 'run.csv').exists():
-            run.notes.append('no run.csv: the rows are those of run.lcmlog')
+            run.notes.append(NO_CSV)
         return run
     if kind_of(named(path)[0]) == CSV:
         return RunFiles(path, _base_name(path), notes=[
