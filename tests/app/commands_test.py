@@ -100,8 +100,9 @@ class Run:
         """Waits until the run is under way, however long the program takes to start."""
         deadline = time.monotonic() + 20
         while not self.log.exists() or b'ABS_TELEMETRY' not in self.log.read_bytes():
-            if time.monotonic() > deadline:
-                sys.exit('FAILED: no cycle within 20 s')
+            if time.monotonic() > deadline or self.process.poll() is not None:
+                self.process.terminate()
+                sys.exit(f'FAILED: no cycle within 20 s: {self.process.communicate(timeout=60)}')
             time.sleep(0.05)
 
     def end(self):
