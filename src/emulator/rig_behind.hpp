@@ -92,8 +92,8 @@ class RigBehind {
 
   /// Duties that now reach the power stage.
   [[nodiscard]] virtual Outputs outputs() const noexcept = 0;
-  /// The computer has paused the emulator for so long. A board lives on meanwhile, and so does the program that feeds its
-  /// watchdog, which the pause has kept from it: the watchdog does not count this time.
+  /// The computer has paused the emulator for so long. A board lives on meanwhile, and so does the program that feeds
+  /// its watchdog, which the pause has kept from it: the watchdog does not count this time.
   virtual void stood_still(std::int64_t /*duration_ns*/) {}
   /// Advances the rig to `time_ns` (0 at power-on); an earlier time does nothing. Steps end on multiples of `step_ns`,
   /// independent of the times of the host's accesses.
