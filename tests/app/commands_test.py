@@ -97,12 +97,11 @@ class Run:
         time.sleep(1.5)
 
     def wait_for_cycles(self):
-        """Waits until the run is under way, however long the program takes to start."""
-        deadline = time.monotonic() + 20
+        """Waits until the run is under way, however long the program takes to start. In a virtual machine's virtual time no
+        deadline would do: while the guest waits for the host's files, its clock runs ahead."""
         while not self.log.exists() or b'ABS_TELEMETRY' not in self.log.read_bytes():
-            if time.monotonic() > deadline or self.process.poll() is not None:
-                self.process.terminate()
-                sys.exit(f'FAILED: no cycle within 20 s: {self.process.communicate(timeout=60)}')
+            if self.process.poll() is not None:
+                sys.exit(f'FAILED: the run ended before its first cycle: {self.process.communicate()}')
             time.sleep(0.05)
 
     def end(self):
