@@ -84,6 +84,7 @@ class Hm2Fpga : public UdpBoard {
   }
   void bite() override { bite_for("watchdog"); }
   void stood_still(std::int64_t duration_ns) override {
+    if (!armed_) return;
     bites_ns_ += duration_ns;
     last_pet_ns_ += duration_ns;
   }
