@@ -9,7 +9,6 @@ how many were refused and for what cause, how many intervals of 95 % hold the tr
 --sentences: prints those of docs/identification.md alone.
 """
 import argparse
-import json
 import os
 import pathlib
 import sys
@@ -17,7 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import numpy as np  # noqa: E402
-from identification_study import EXPERIMENTS, drawn, values_of, wandering  # noqa: E402
+from identification_study import EXPERIMENTS, drawn, kept, values_of, wandering  # noqa: E402
 from other_rig import driven  # noqa: E402
 
 import abs_hil  # noqa: E402
@@ -51,13 +50,7 @@ KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed',
 
 def one(plant, kind, seed, keep=None):
     """As `tried`, from the folder `keep` if it is there."""
-    kept = keep and keep / f'{plant}-{kind.replace(" ", "-")}-{seed}.json'
-    if kept and kept.exists():
-        return json.loads(kept.read_text(encoding='utf-8'))
-    found = tried(plant, kind, seed)
-    if kept:
-        kept.write_text(json.dumps(found), encoding='utf-8')
-    return found
+    return kept(keep, f'{plant}-{kind}-{seed}', lambda: tried(plant, kind, seed))
 
 
 def tried(plant, kind, seed):

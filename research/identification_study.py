@@ -82,14 +82,20 @@ def wandering(duration_s, random):
     return settings
 
 
+def kept(folder, name, make):
+    """What `make` returns; with a folder from its file of that name, which is made where it is missing."""
+    if folder is None:
+        return make()
+    file = folder / f'{name.replace(" ", "-")}.json'
+    if not file.exists():
+        file.write_text(json.dumps(make(), default=lambda value: value.item()), encoding='utf-8')
+    return json.loads(file.read_text(encoding='utf-8'))
+
+
 def one(plant, seed, disturbed, more, keep=None):
     """A row of results: name -> value."""
-    if keep is None:
-        return measured(plant, seed, disturbed, more)
-    kept = keep / f'{"-".join([plant, str(seed), *(["disturbed"] if disturbed else []), *more])}.json'
-    if not kept.exists():
-        kept.write_text(json.dumps(measured(plant, seed, disturbed, more), default=lambda value: value.item()), encoding='utf-8')
-    return json.loads(kept.read_text(encoding='utf-8'))
+    return kept(keep, '-'.join([plant, str(seed), *(['disturbed'] if disturbed else []), *more]),
+                lambda: measured(plant, seed, disturbed, more))
 
 
 def measured(plant, seed, disturbed, more):

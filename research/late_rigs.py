@@ -14,7 +14,6 @@ the right form.
 """
 import argparse
 import dataclasses
-import json
 import os
 import pathlib
 import sys
@@ -23,7 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import numpy as np  # noqa: E402
-from identification_study import EXPERIMENTS, drawn, values_of  # noqa: E402
+from identification_study import EXPERIMENTS, drawn, kept, values_of  # noqa: E402
 
 import abs_hil  # noqa: E402
 from abs_hil.core import _core  # noqa: E402
@@ -81,13 +80,7 @@ def tried(plant, seed, clean):
 
 
 def one(plant, seed, clean, keep=None):
-    kept = keep and keep / f'{"clean" if clean else "late"}-{plant}-{seed}.json'
-    if kept and kept.exists():
-        return json.loads(kept.read_text(encoding='utf-8'))
-    found = tried(plant, seed, clean)
-    if kept:
-        kept.write_text(json.dumps(found), encoding='utf-8')
-    return found
+    return kept(keep, f'{"clean" if clean else "late"}-{plant}-{seed}', lambda: tried(plant, seed, clean))
 
 
 def main():
