@@ -124,8 +124,8 @@ def _doubt(found: Identified) -> str:
     odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
     factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
     if factor > LARGEST_WANDER:
-        return (f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % '
-                'would explain them with one set of parameters. Are they of one rig, and of one state of its brake and tyre?')
+        return (f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of '
+                f'parameters only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
         return (f'the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, '
                 'expected 1); is it of another rig, has something changed between the logs, or is the brake weaker in some of '
