@@ -41,8 +41,10 @@ fi
 step "fresh clone"
 rm -rf "$root/srv/abs_hil"
 git clone -q "file://$source" "$root/srv/abs_hil"
-# A cache of compiled objects from outside is used where there is one: its path and what it holds change no result.
+# A cache of compiled objects from outside is used where there is one: it changes the time and no result. The second command
+# installs ccache, too; by then the build folder has its compiler.
 if [ -n "${CCACHE_DIR:-}" ] || [ -d "$HOME/.cache/ccache" ]; then
+  inside apt-get install -y -qq --no-install-recommends ccache >/dev/null
   mkdir -p "$root/srv/.cache/ccache" "$root/srv/.config/ccache"
   mount --bind "${CCACHE_DIR:-$HOME/.cache/ccache}" "$root/srv/.cache/ccache"
 fi
