@@ -52,7 +52,7 @@ struct DriverOptions {
                  .safety = rig::no_effect_on_safety);
   ABS_HIL_OPTION(std::string, records, "",
                  .meaning = "folder of the commissioning records; empty: /var/lib/abs_hil/boards, or the user's own",
-                 .safety = rig::judged_elsewhere);
+                 .safety = rig::weaker_unless(""));
   ABS_HIL_GROUP(AllBoardOptions, boards, "", {});
   ABS_HIL_GROUP(SimOptions, sim, "sim.", {});
   // Known from elsewhere in the configuration.

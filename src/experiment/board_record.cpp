@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <boost/crc.hpp>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -20,7 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int record_format = 1;
+/// Format 1 had no checksum.
+constexpr int record_format = 2;
 
 /// The values of all options, as text.
 template <class Options>
@@ -67,17 +69,31 @@ nlohmann::ordered_json to_json(const BoardRecord& r) {
             {"release_ms", optional_json(r.outputs.release_ms)}}}};
 }
 
+/// Of the record without its checksum: it tells a record that somebody has edited from one that was measured.
+std::string checksum_of(const nlohmann::ordered_json& json) {
+  const std::string text = json.dump();
+  boost::crc_32_type crc;
+  crc.process_bytes(text.data(), text.size());
+  return fmt::format("{:08x}", crc.checksum());
+}
+
 /// What `difference` compares. Throws nlohmann::json::exception or std::runtime_error.
 BoardRecord parse_record(std::istream& in) {
-  const nlohmann::json json = rig::parse_json(in);
-  if (json.at("abs_hil_board_record") != record_format) throw std::runtime_error("of another format");
+  auto json = rig::parse_json<nlohmann::ordered_json>(in);
+  if (json.at("abs_hil_board_record") != record_format) {
+    throw std::runtime_error("of another format, as an earlier version wrote it; commission the board again");
+  }
+  const std::string checksum = json.at("checksum");
+  json.erase("checksum");
+  if (checksum != checksum_of(json)) {
+    throw std::runtime_error("it was edited after the commissioning, its checksum does not fit; commission again");
+  }
   return {.kind = json.at("driver_kind"),
           .board = {.place = json.at("place"), .logic = json.at("logic")},
           .emulated = json.at("emulated"),
           .options = json.at("options"),
           .encoder_counts_per_rev = json.at("encoder_counts_per_rev"),
-          .identity = json.value("identity", std::map<std::string, std::string>{}),
-          // A record without them is older than the check of the encoders' scale.
+          .identity = json.at("identity"),
           .one_turn = {.upper = json.at("counts_of_one_turn").at("upper"),
                        .lower = json.at("counts_of_one_turn").at("lower")},
           .date = json.at("date"),
@@ -85,18 +101,11 @@ BoardRecord parse_record(std::istream& in) {
 }
 
 /// Why the record in this file does not hold; empty if it does, nothing if there is no such file.
-/// @param note  what a person should know of a record that holds
-std::optional<std::string> difference_of_file(const fs::path& file, const BoardRecord& present, std::string& note) {
+std::optional<std::string> difference_of_file(const fs::path& file, const BoardRecord& present) {
   std::ifstream in(file);
   if (!in) return std::nullopt;
   try {
-    const BoardRecord record = parse_record(in);
-    const std::string why = difference(record, present);
-    if (why.empty() && record.identity.empty()) {
-      note = file.string() +
-             ": this commissioning record is older than the rig's identity, so the limits are those of the default "
-             "identity, paper-table1; commission again with --set rig.identity=FILE of your rig (docs/safety.md)";
-    }
+    const std::string why = difference(parse_record(in), present);
     return why.empty() ? why : file.string() + ": " + why;
   } catch (const std::exception& error) {
     return file.string() + " is no commissioning record: " + error.what();
@@ -185,7 +194,9 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
     fs::create_directories(folder, error);
     const fs::path file = folder / file_name(record);
     try {
-      files::write_result(file, "commissioning record", to_json(record).dump(2) + '\n');
+      nlohmann::ordered_json json = to_json(record);
+      json["checksum"] = checksum_of(json);
+      files::write_result(file, "commissioning record", json.dump(2) + '\n');
       return file;
     } catch (const files::FileError& failure) {
       problems += (problems.empty() ? "" : "; ") + file.string() + ": " + std::strerror(failure.error_number());
@@ -197,20 +208,20 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
       "2775 /var/lib/abs_hil/boards");
 }
 
-std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
-                           const driver::BoardIdentity& board) {
-  const BoardRecord present = describe_board(options, identity, board, false);
-  std::string why;
-  std::string note;
-  const std::vector<fs::path> folders = record_folders(options.records);
+std::string why_not_commissioned(const BoardRecord& present, const std::vector<fs::path>& folders) {
+  std::string none;
   for (const fs::path& folder : folders) {
-    const std::optional<std::string> found = difference_of_file(folder / file_name(present), present, note);
-    if (found && found->empty()) return note;
-    if (found && why.empty()) why = *found;
+    if (const auto found = difference_of_file(folder / file_name(present), present)) return *found;
+    none += (none.empty() ? "no record in " : " or ") + folder.string();
   }
-  if (why.empty()) {
-    for (const fs::path& folder : folders) why += (why.empty() ? "no record in " : " or ") + folder.string();
-  }
+  return none;
+}
+
+void require_record(const driver::DriverOptions& options, const RigIdentity& identity,
+                    const driver::BoardIdentity& board) {
+  const std::string why =
+      why_not_commissioned(describe_board(options, identity, board, false), record_folders(options.records));
+  if (why.empty()) return;
   throw driver::Unavailable(
       "backend rig: this board (" + options.kind + ' ' + described(board) +
       ") has not been commissioned as it is now: " + why +

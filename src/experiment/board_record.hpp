@@ -32,7 +32,7 @@ struct BoardRecord {
   bool emulated{false};                          ///< the record of an emulator, which no hardware matches
   std::map<std::string, std::string> options{};  ///< "driver.pci.lower_sign" -> "1": those that a commissioning tests
   int encoder_counts_per_rev{0};
-  /// "rig.theta_N" -> "23": the rig's identity. Empty in records from before there was one: it is the default then.
+  /// "rig.theta_N" -> "23": the rig's identity.
   std::map<std::string, std::string> identity{};
   OutputTimes outputs{};
   WheelCounts one_turn{};  ///< of each wheel, by hand; 0: not measured
@@ -60,9 +60,14 @@ struct BoardRecord {
 /// its path. Throws driver::Unavailable.
 std::filesystem::path write_record(const BoardRecord& record, const std::vector<std::filesystem::path>& folders);
 
-/// Throws driver::Unavailable, with the command to type, unless there is a record that holds for this board.
-/// @return what a person should know of the record that holds; empty: nothing
-std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
-                           const driver::BoardIdentity& board);
+/// Why the present board and options have no record that holds; empty if they have. The first folder with a record of
+/// this board decides, so that a user's own does not replace the machine's.
+[[nodiscard]] std::string why_not_commissioned(const BoardRecord& present,
+                                               const std::vector<std::filesystem::path>& folders);
+
+/// Throws driver::Unavailable, with the command to type, unless the board has a record that holds, in the options'
+/// folders.
+void require_record(const driver::DriverOptions& options, const RigIdentity& identity,
+                    const driver::BoardIdentity& board);
 
 }  // namespace abs_hil::experiment

@@ -63,7 +63,7 @@ int doctor(const config::Settings& s, const std::string& only, bool json) {
                                      }};
   if (s.on_rig() && config::is_real_board(s.driver)) {
     examination.require_commissioned = [&s](const driver::RigDriver& driver) {
-      static_cast<void>(experiment::require_record(s.driver, s.rig, driver.identity()));
+      experiment::require_record(s.driver, s.rig, driver.identity());
     };
   }
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);

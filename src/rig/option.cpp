@@ -42,8 +42,8 @@ bool AllowedNames::contains(std::string_view name) const noexcept {
 }
 
 std::string SafetyClass::in_words(std::string_view unit) const {
-  const std::string value =
-      text.empty() ? number_text(bound) + (unit.empty() ? "" : ' ' + std::string(unit)) : std::string(text);
+  const std::string number = number_text(bound) + (unit.empty() ? "" : ' ' + std::string(unit));
+  const std::string value = text.data() == nullptr ? number : text.empty() ? "empty" : std::string(text);
   switch (kind) {
     case Kind::unclassed: return "not classed";
     case Kind::none: return "no effect";

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
@@ -23,14 +24,12 @@ struct Lab {
   RigIdentity rig{};
   driver::pci::PciOptions& pci{options.boards.of<driver::pci::PciOptions>()};
 
-  mutable std::string note{};  ///< of the record that holds
-
   void commission(bool emulated = false) const {
     write_record(describe_board(options, rig, card, emulated), record_folders(options.records));
   }
   [[nodiscard]] std::string refusal(const driver::BoardIdentity& board = card) const {
     try {
-      note = require_record(options, rig, board);
+      require_record(options, rig, board);
     } catch (const driver::Unavailable& error) {
       return error.what();
     }
@@ -100,7 +99,6 @@ TEST_CASE("A record holds for the identity of the rig alone, from which the limi
   lab.rig.parameters.tyre.theta_N = 40.0;
   lab.commission();
   CHECK(lab.refusal().empty());
-  CHECK(lab.note.empty());
   lab.rig.source = "elsewhere.toml";  // the values count
   CHECK(lab.refusal().empty());
   for (double* value : {&lab.rig.parameters.tyre.theta_N, &lab.rig.parameters.motor.stall_torque_Nm,
@@ -123,15 +121,40 @@ TEST_CASE("A record that is older than a key of the identity holds for the key's
   CHECK_THAT(lab.refusal(), Contains("rig.brake_dead_time_s was 0 then and is 0.0129 now"));
 }
 
-TEST_CASE("A record from before the identity holds for the default identity, and says so") {
-  Lab lab;
-  BoardRecord record = describe_board(lab.options, {}, card, false);
-  record.identity.clear();
-  write_record(record, record_folders(lab.options.records));
+TEST_CASE("A record that somebody has edited, or without a checksum, is refused") {
+  const Lab lab;
+  lab.commission();
+  const auto file = lab.folder.path / "pci-0000_03_00.0.json";
+  std::stringstream whole;
+  whole << std::ifstream(file).rdbuf();
+  const std::string text = whole.str();
+  for (const auto& [was, is] : std::initializer_list<std::pair<std::string, std::string>>{
+           {R"("rig.theta_N": "23")", R"("rig.theta_N": "500")"},
+           {R"("emulated": false)", R"("emulated":  false,"more": 1)"},
+           {R"("abs_hil_board_record": 2)", R"("abs_hil_board_record": 1)"},
+           {R"("checksum": )", R"("checksum_of_old": )"}}) {
+    INFO(is);
+    std::string edited = text;
+    REQUIRE(edited.find(was) != std::string::npos);
+    std::ofstream(file) << edited.replace(edited.find(was), was.size(), is);
+    CHECK_THAT(lab.refusal(), Contains(file.string() + " is no commissioning record"));
+  }
+  std::ofstream(file) << text;
   CHECK(lab.refusal().empty());
-  CHECK_THAT(lab.note, Contains("older than the rig's identity") && Contains("paper-table1"));
-  lab.rig.parameters.tyre.theta_N = 1000.0;
-  CHECK_THAT(lab.refusal(), Contains("rig.theta_N was 23 then and is 1000 now"));
+}
+
+TEST_CASE("The first folder that has a record of the board decides") {
+  const Lab lab;
+  const std::filesystem::path machine = lab.folder.path / "machine";
+  const std::filesystem::path user = lab.folder.path / "user";
+  BoardRecord record = describe_board(lab.options, lab.rig, card, false);
+  write_record(record, {user});
+  CHECK(why_not_commissioned(record, {machine, user}).empty());
+  RigIdentity other;
+  other.parameters.tyre.theta_N = 230.0;
+  write_record(describe_board(lab.options, other, card, false), {machine});
+  CHECK_THAT(why_not_commissioned(record, {machine, user}),
+             Contains("rig.theta_N was 230 then and is 23 now") && Contains(machine.string()));
 }
 
 TEST_CASE("The record of an emulator holds for no hardware") {

@@ -64,7 +64,7 @@ class OwnBackend(unittest.TestCase):
     def options(self, board, *more):
         # The board and the program share this computer with whatever else runs: neither may mind its pauses.
         settings = ['driver.serial.answer_timeout_ms=200', 'guardian.timeout_ms=1000', 'guardian.insist_s=5',
-                    'unsafe.outputs_on_after_death=true', 'unsafe.keys=guardian.insist_s',
+                    'unsafe.outputs_on_after_death=true', 'unsafe.keys=guardian.insist_s,driver.records',
                     'gate.sample_age_max_s=0.5', 'unsafe.blind_control=true',
                     'driver.kind=serial', f'driver.serial.port={board.port}', f'driver.records={self.folder}/records',
                     *more]
