@@ -5,12 +5,9 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <variant>
 
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/rig/option_check.hpp"
 #include "driver/injection/injection.hpp"
-#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 
@@ -85,35 +82,6 @@ void refuse_impatient_guardian(const Settings& s, bool virtual_time) {
       s.guardian.timeout_ms, two_periods_ms / 2.0, two_periods_ms));
 }
 
-/// True if a person has consented to a weak value: by its key in `unsafe.keys`, or by the flag that its row names.
-bool has_consent(const Key& weak, const Settings& s, const KeyTable& keys) {
-  const std::vector<std::string_view> named = rig::split(s.unsafe.keys, ',');
-  if (std::ranges::find(named, weak.name) != named.end()) return true;
-  const Key* flag = find_key(keys.keys(), fmt::format("unsafe.{}", weak.safety.consent));
-  return flag != nullptr && value_of(*flag) == Value(true);
-}
-
-/// One rule for all options: what weakens the protection by its row needs a person's consent, and is told.
-std::vector<std::string> refuse_weak_values(const Settings& s, const KeyTable& keys) {
-  std::vector<std::string> accepted;
-  if (!is_real_board(s.driver)) return accepted;
-  for (const Key& key : keys.keys()) {
-    if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
-    const std::string value = text_of(value_of(key));
-    const std::string weakness = key.safety.in_words(key.unit);
-    if (!has_consent(key, s, keys)) {
-      const std::string_view consent = key.safety.consent;
-      throw std::invalid_argument(fmt::format(
-          "{0} = {1}: this value weakens the protection of a real board ({2}; {3}); give another one, or "
-          "accept the risk with --set unsafe.keys={0}{4}",
-          key.name, value, weakness, key.meaning, consent.empty() ? "" : fmt::format(" or unsafe.{}=true", consent)));
-    }
-    accepted.push_back(fmt::format("{} = {} weakens the protection of this board ({}; {}); unsafe. accepts it",
-                                   key.name, value, weakness, key.meaning));
-  }
-  return accepted;
-}
-
 /// The gate and the ends of phases would see wrong speeds, on an emulator too.
 void refuse_other_counts(const Settings& s) {
   const std::int32_t model = s.model.encoder_counts_per_rev;
@@ -153,7 +121,7 @@ bool is_real_board(const driver::DriverOptions& driver) {
   return board.reality == driver::Reality::unknown ? !driver.emulated : is_certainly_real(board);
 }
 
-std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& keys, bool virtual_time) {
+std::vector<std::string> refuse_unsafe_use(const Settings& s, const SafetyView& view, bool virtual_time) {
   refuse_virtual_time_on_hardware(s, virtual_time);
   refuse_start_speed(s);
   refuse_unfit_options(s, virtual_time);
@@ -162,7 +130,7 @@ std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& ke
   refuse_impatient_guardian(s, virtual_time);
   refuse_foreign_code(s);
   refuse_other_counts(s);
-  return refuse_weak_values(s, keys);
+  return is_real_board(s.driver) ? refuse_weak_rows(view) : std::vector<std::string>{};
 }
 
 void apply_board_limits(Settings& s, const KeyTable& keys) {

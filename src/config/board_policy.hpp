@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "config/key_table.hpp"
+#include "config/safety_view.hpp"
 
 namespace abs_hil::config {
 
@@ -15,9 +15,9 @@ namespace abs_hil::config {
 /// start, answers that take longer than a period, injected faults, no guardian, a guardian that would end a healthy
 /// run, and on hardware every value that weakens the protection without a person's consent. Throws
 /// std::invalid_argument, which names the key and the fix. Before anything has moved.
-/// @param keys  of `s`
+/// @param view  of `s`
 /// @return the weak values that a person has consented to, a sentence each; none for an emulator
-std::vector<std::string> refuse_unsafe_use(const Settings& s, const KeyTable& keys, bool virtual_time);
+std::vector<std::string> refuse_unsafe_use(const Settings& s, const SafetyView& view, bool virtual_time);
 
 /// Lowers the gate's duty caps to the board's, so that the controller's anti-windup knows them, and tells the drivers
 /// the encoders' resolution and the rate, which their own checks need. Throws std::invalid_argument for a cap that a

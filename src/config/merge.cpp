@@ -204,15 +204,26 @@ void fill(Settings& s, KeyTable& keys, const Sources& sources, const Said& said,
   s.realtime.mode = realtime_mode(sources.realtime, s);
 }
 
-/// Everything but the texts of the configuration.
-void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
+/// The script of a series of experiments has no phases: its members are judged one by one.
+SafetyView view_of(const Script& script, const Settings& s, const KeyTable& keys) {
+  return safety_view(s, keys, script.phases.empty() ? Plan{} : plan(script, s));
+}
+
+/// What the sources say, before anything judges it.
+void read_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   Settings& s = merged.settings;
   s.backend = sources.backend;
   if (s.on_rig()) keys.leave_out_plant();
   const Said said = read_sources(sources, s, keys);
   merged.script = script_of(sources, said);
+  fill(s, keys, sources, said, *merged.script);
+}
+
+/// Everything but the texts of the configuration.
+void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
+  read_into(merged, keys, sources);
+  Settings& s = merged.settings;
   const Script& script = *merged.script;
-  fill(s, keys, sources, said, script);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
   }
@@ -221,7 +232,8 @@ void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
   if (s.on_rig()) {
     check_consents(s, keys);
-    for (const std::string& weak : refuse_unsafe_use(s, keys, sources.virtual_time)) warn_once(weak);
+    const SafetyView view = view_of(script, s, keys);
+    for (const std::string& weak : refuse_unsafe_use(s, view, sources.virtual_time)) warn_once(weak);
     apply_board_limits(s, keys);
   }
   for (const std::string& problem : theta_out_of_bounds(s)) warn_once(problem);
@@ -260,6 +272,14 @@ Configuration merge(const Sources& sources) {
   merge_into(merged, keys, sources);
   write_texts(merged, keys);
   return merged;
+}
+
+SafetyView safety_view(const Sources& sources) {
+  Configuration merged;
+  KeyTable keys(merged.settings);
+  read_into(merged, keys, sources);
+  apply(*merged.script, merged.settings);
+  return view_of(*merged.script, merged.settings, keys);
 }
 
 Settings merged_settings(const Sources& sources) {

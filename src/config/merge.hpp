@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "config/config_file.hpp"
+#include "config/safety_view.hpp"
 #include "config/script.hpp"
 #include "config/settings.hpp"
 
@@ -52,6 +53,8 @@ struct Configuration {
 [[nodiscard]] Configuration merge(const Sources& sources);
 /// The settings alone, without the texts, which cost as much again.
 [[nodiscard]] Settings merged_settings(const Sources& sources);
+/// What a run from these sources may do on a board, before anything has judged it. Throws ConfigError.
+[[nodiscard]] SafetyView safety_view(const Sources& sources);
 /// The configuration of these settings, as a merge left them or with other values since.
 [[nodiscard]] Configuration configuration_of(Settings settings);
 

@@ -20,7 +20,24 @@ namespace abs_hil::program {
 
 namespace {
 
-int validate(const config::Sources& sources) {
+/// Prints what the run may do on a board. Throws std::invalid_argument if a part of it, or of a run of its series,
+/// needs a person's consent.
+void show_safety(const config::Sources& sources) {
+  const config::SafetyView view = config::safety_view(sources);
+  cli::print("{}\n", config::in_words(view));
+  static_cast<void>(config::refuse_weak_rows(view));
+  const config::Configuration merged = config::merge(sources);
+  if (!merged.script->series.given || sources.one_of_series) return;
+  for (const config::SeriesMember& member : config::members_of(*merged.script, merged.settings.seed)) {
+    config::Sources one = sources;
+    config::choose(member, one);
+    static_cast<void>(config::refuse_weak_rows(config::safety_view(one)));
+  }
+}
+
+/// @param safety  say first what the run may do on a board
+int validate(const config::Sources& sources, bool safety) {
+  if (safety) show_safety(sources);
   const config::Configuration merged = config::merge(sources);
   const config::Script& script = *merged.script;
   const config::Settings& s = merged.settings;
@@ -32,7 +49,7 @@ int validate(const config::Sources& sources) {
       config::Sources one = sources;
       one.experiment = name;
       config::refuse_nested(script, *config::find(*one.experiment));
-      status = std::max(status, validate(one));
+      status = std::max(status, validate(one, safety));
     }
     return status;
   }
@@ -81,12 +98,16 @@ int init_rig(const config::Settings& settings, const std::string& name) {
 Action add_validate(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<config::Sources>();
   const auto schema = std::make_shared<bool>(false);
+  const auto safety = std::make_shared<bool>(false);
   parser.add("EXPERIMENT", &o->experiment, "experiment by name or TOML file", {.type = "NAME|FILE"});
+  parser.add("--safety", safety.get(),
+             "print all that the run may do on a board, and what needs a person's consent there");
   parser.add("--schema", schema.get(), "print the JSON Schema of experiment files instead");
   add_backend_option(parser, *o);
   add_configuration_options(parser, *o);
-  return [o, schema] {
-    if (!*schema) return validate(*o);
+  return [o, schema, safety] {
+    if (*safety) o->backend = "rig";
+    if (!*schema) return validate(*o, *safety);
     cli::print("{}\n", config::schema().dump(2));
     return int{exit_completed};
   };

@@ -28,7 +28,7 @@ struct Asked {
 
   [[nodiscard]] std::string refusal() {
     try {
-      accepted = config::refuse_unsafe_use(s, keys, virtual_time);
+      accepted = config::refuse_unsafe_use(s, config::safety_view(s, keys, {}), virtual_time);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -197,7 +197,7 @@ TEST_CASE("A weak value on hardware needs a person's consent, and is told; an em
   run.s.unsafe = {.keys = "gate.overspeed_rad_s,guardian.insist_s"};
   CHECK(run.refusal().empty());
   CHECK(run.accepted.size() == 1);
-  CHECK_THAT(run.accepted.at(0), Contains("guardian.insist_s = 0.001 weakens the protection"));
+  CHECK_THAT(run.accepted.at(0), Contains("guardian.insist_s = 0.001 s weakens the protection"));
   run.s.unsafe.keys = "";
   pci(run.driver).root = "/tmp";
   CHECK(run.refusal().empty());

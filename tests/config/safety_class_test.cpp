@@ -23,7 +23,7 @@ std::string refusal(const std::string& assignment, const std::string& consent = 
   keys.set_text(assignment, "test");
   if (!consent.empty()) keys.set_text(consent, "test");
   try {
-    static_cast<void>(config::refuse_unsafe_use(s, keys, false));
+    static_cast<void>(config::refuse_unsafe_use(s, config::safety_view(s, keys, {}), false));
   } catch (const std::invalid_argument& error) {
     return error.what();
   }

@@ -116,7 +116,7 @@ bool acts_here(const std::string& name) {
 
 bool refused_on_a_board(const config::Settings& s, const config::KeyTable& keys) {
   try {
-    static_cast<void>(config::refuse_unsafe_use(s, keys, false));
+    static_cast<void>(config::refuse_unsafe_use(s, config::safety_view(s, keys, {}), false));
   } catch (const std::invalid_argument&) {
     return true;
   }
