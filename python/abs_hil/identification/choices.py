@@ -64,6 +64,12 @@ def _lowered(fit: Fit, levels: Sequence[float]) -> float:
         return np.inf
 
 
+def are_of_a_board(fit: Fit) -> bool:
+    """True if the logs' own duties are those that some board gives."""
+    duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
+    return any(np.abs(duties * steps - np.rint(duties * steps)).max() < 1e-5 for steps in PWM_STEPS)
+
+
 def with_steps(fit: Fit) -> Iterator[tuple[float, Fit]]:
     """The fit to duties as boards would have given them, which the logs hold as they were asked for, each with the level of
     disturbances that would take up what a step is: one that cannot follow there has other reasons. To be believed only if nothing

@@ -156,8 +156,10 @@ def _likelier(fits: Sequence[Fit], seed: int) -> Finished:
 
 def _quiet(fit: Fit) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
-    board gives them; with late inputs and a limit of the brake's rate where the logs show them."""
+    board gives them; with late inputs and a limit of the brake's rate where the logs show them. Of duties that no board gives
+    as they are, the likeliest rounding counts: it may be too little to be seen in the residual, and yet move the parameters."""
     stopped = 0.0
+    best = None
     for takes_up, tried in itertools.chain([(np.inf, fit)], choices.with_steps(fit)):
         if stopped > takes_up:
             continue
@@ -169,10 +171,13 @@ def _quiet(fit: Fit) -> Fit | None:
                     found = more
         except (ValueError, np.linalg.LinAlgError):
             continue
-        if not (left := _left_by(found)):
+        if left := _left_by(found):
+            fit.problem.say(left)
+        elif choices.are_of_a_board(fit):
             return found
-        fit.problem.say(left)
-    return None
+        elif best is None or found.cost.sum() < best.cost.sum():
+            best = found
+    return best
 
 
 def _settled(quiet: Fit, seed: int) -> Finished:
