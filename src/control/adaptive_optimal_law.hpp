@@ -83,11 +83,17 @@ void AdaptiveOptimalLaw<S>::learn(const BasicSlipInput<S>& input, const S& slip)
 }
 
 /// If the slip runs away within the time that the brake takes to act, the reference must not be past the peak, whatever
-/// is expected of it.
+/// is expected of it. Behind a dead time the loop does not swing past the peak by itself, and a flat curve shows its
+/// peak only farther out: there the reference goes on, as long as the slip would not run away within dead time and lag.
 template <class S>
 S AdaptiveOptimalLaw<S>::peak_factor() const noexcept {
-  constexpr double least = 0.75;
-  return rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
+  constexpr double least = 0.75, flat_runaway = 0.12, flat_part = 0.5;
+  const S factor =
+      rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
+  if (!rig::any(dead_time_s_ > 0.0)) return factor;
+  const S runaway = bank_.runaway() * (1.0 + brake_.c31_per_s * dead_time_s_);
+  const S farther = flat_part * rig::larger(S(0.0), S(1.0 - runaway / flat_runaway));
+  return factor + rig::select(dead_time_s_ > 0.0, farther, S(0.0));
 }
 
 /// Where the slip runs away behind the peak, a search passes the peak and costs more than it finds. But the first noise

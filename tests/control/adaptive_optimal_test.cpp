@@ -56,18 +56,19 @@ TEST_CASE("Behind a dead time: near the optimum, which coasts so much longer, al
   constexpr double dead_s = 0.024, optimum_m = 15.622 + 170.0 * 0.0990 * dead_s;
   auto s = real_rig();
   s.plant->brake.brake_dead_time_s = dead_s;
+  s.omega1_start = s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m;  // no slip, as after coasting
   const auto told = [&](double part) {
     s.rig.brake.brake_dead_time_s = part * dead_s;
     return measured(s);
   };
   const Braking right = told(1.0);
-  CHECK(right.distance_m < 1.035 * optimum_m);
-  CHECK(right.largest_slip < 0.15 + 0.05);
+  CHECK(right.distance_m < 1.045 * optimum_m);
+  CHECK(right.largest_slip < 0.25);
   for (const double part : {0.7, 1.3}) {
     CAPTURE(part);
     CHECK(told(part).distance_m < 1.085 * optimum_m);
   }
-  CHECK(told(0.0).distance_m > 1.15 * optimum_m);  // what a law without a predictor needs
+  CHECK(told(0.0).distance_m > 1.2 * optimum_m);  // what a law without a predictor needs
 }
 
 TEST_CASE(
