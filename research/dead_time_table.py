@@ -41,7 +41,7 @@ def distances(build, plant, law, slip, told):
 
 def main():
     build = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / 'build' / 'release').resolve()
-    print('| law, dead time told | ' + ' | '.join(plant for plant, _ in PLANTS) + ' |\n|---' + '|---:' * len(PLANTS) + '|')
+    print('| law, Td told | ' + ' | '.join(plant for plant, _ in PLANTS) + ' |\n|---' + '|---:' * len(PLANTS) + '|')
     bounds = {}
     for plant, _ in PLANTS:
         even = settings_of(['plant.brake_dead_time_s=0', 'plant.brake_release_lead_s=0'])
@@ -51,7 +51,7 @@ def main():
         cells = []
         for plant, slip in PLANTS:
             over = [100.0 * (way / bounds[plant] - 1.0) for way in distances(build, plant, law, slip, told)]
-            cells.append(f'{statistics.mean(over):.1f}, {max(over):.1f}')
+            cells.append(f'{statistics.mean(over):.1f}/{max(over):.1f}')
         print(f'| `{law}`' + (f', {told:g} times' if told != 1.0 else '') + ' | ' + ' | '.join(cells) + ' |')
 
 
