@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-# (description, functions, budget in instructions per cycle, and the controller if it is not adaptive)
+# (description, functions, budget in instructions per cycle, and the controller if it is not adaptive, and its dead time)
 BUDGETS = [
     # 1,000 until late samples had to be plausible (some 60) and the controller reported its states and V (some 85).
     ('observers, adaptive controller, gate',
@@ -34,16 +34,21 @@ BUDGETS = [
     # A bank of 24 curves; nearly the same number of operations in each cycle.
     ('adaptive-optimal', ['abs_hil::control::LawController<abs_hil::control::AdaptiveOptimalLaw>::step*'], 6000,
      'adaptive-optimal'),
+    # Four parts of 6 ms, and the force where they end.
+    ('adaptive-optimal behind a dead time of 24 ms',
+     ['abs_hil::control::LawController<abs_hil::control::AdaptiveOptimalLaw>::step*'], 12600, 'adaptive-optimal', '0.024'),
+    ('adaptive-predictor behind 24 ms',
+     ['abs_hil::control::LawController<abs_hil::control::AdaptivePredictorLaw>::step*'], 3500, 'adaptive-predictor', '0.024'),
 ]
 
 
-def count(program, functions, controller):
+def count(program, functions, arguments):
     """Instructions of all calls of the functions, including their callees, and the number of cycles of the run."""
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / 'callgrind.out'
         toggles = [f'--toggle-collect={function}' for function in functions]
         run = subprocess.run(['valgrind', '--tool=callgrind', *toggles, f'--callgrind-out-file={out}', program,
-                              controller],
+                              *arguments],
                              capture_output=True, text=True)
         if run.returncode:
             sys.exit(f'{program} under callgrind ended with status {run.returncode}:\n{run.stderr}')
@@ -59,8 +64,8 @@ def main():
         print('SKIPPED: valgrind is not installed')
         return 77
     over = False
-    for what, functions, budget, *controller in BUDGETS:
-        total, cycles = count(sys.argv[1], functions, *(controller or ['adaptive']))
+    for what, functions, budget, *arguments in BUDGETS:
+        total, cycles = count(sys.argv[1], functions, arguments or ['adaptive'])
         per_cycle = total / cycles
         exceeded = not 0 < per_cycle <= budget
         over = over or exceeded

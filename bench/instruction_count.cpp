@@ -49,9 +49,11 @@ extern "C" {
 
 }  // extern "C"
 
-/// Brakes from 170 rad/s under slip control and prints the number of cycles. `bench_instruction_count [CONTROLLER]`.
+/// Brakes from 170 rad/s under slip control and prints the number of cycles. `bench_instruction_count
+/// [CONTROLLER [DEAD_TIME_S]]`.
 int main(int argc, char** argv) {
-  const experiment::test::Setup setup = experiment::test::braking(argc > 1 ? argv[1] : "adaptive");
+  experiment::test::Setup setup = experiment::test::braking(argc > 1 ? argv[1] : "adaptive");
+  if (argc > 2) setup.plant.rig.brake.brake_dead_time_s = std::strtod(argv[2], nullptr);
   driver::SimDriver driver(setup.plant, {.seed = 1, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
   driver.configure();
   driver.activate(0);

@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
-"""usage: drawn_table.py KEPT [--sentences | --combined | --lag]
+"""usage: drawn_table.py KEPT [--sentences | --combined]
 
 Brakings that docs/theory-beyond.md draws besides the benchmark: 200 cases of a seed under five laws. Prints the table "drawn";
 --sentences prints the sentence on the worst of them, --combined that on draws of cases with several things wrong at once, cold
-and after a stop, --lag what a model with the plant's brake would win there, and with it a law that learns the
-lag. KEPT is the folder of the bounds drawn.json and combined.json, which are computed if they are not there.
+and after a stop. KEPT is the folder of the bounds drawn.json and combined.json, which are computed if they are not there.
 Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
-import dataclasses
 import pathlib
 import sys
 
@@ -19,8 +17,6 @@ from abs_hil.benchmark import Entry, bounds, cases, run
 SEED, COUNT = 27182, 200
 #: a draw of combined cases that chose nothing of the law; each case with so many positions of the wheels within a count
 HELD_OUT_SEED, PHASES = 20261201, 6
-#: the worst of few positions is chance; and the keys of the brake's model
-LAG_PHASES, BRAKE = 24, ('c31_per_s', 'b1_Nm', 'b2_Nm', 'u0')
 OWN = 'adaptive-optimal'
 #: row -> controller, settings
 ROWS = {f'`{OWN}`': (OWN, {}), f'`{OWN}` at 5 kHz': (OWN, {'control.rate_Hz': 5000.0}), '`adaptive-peak`': ('adaptive-peak', {}),
@@ -81,35 +77,9 @@ def combined(kept):
             f'{warm_mean}, {warm_most} and {warm_worst} %.')
 
 
-def told(chosen):
-    """The cases with a model that has the plant's brake, and is otherwise as wrong as before."""
-    return [dataclasses.replace(case, unknown=tuple(name for name in case.unknown if name not in BRAKE)) for case in chosen]
-
-
-def lag(kept):
-    """Each figure with the model's brake→with the plant's."""
-    def both(sets, warm=False):
-        """The excess over all sets, with each model."""
-        phases = tuple(range(1, LAG_PHASES + 1))
-        return [np.concatenate([figures(OWN, {}, known(chosen), file, phases, warm)[1].ravel() for chosen, file in sets])
-                for known in (list, told)]
-
-    def pair(values, figure=np.mean, decimals=1):
-        return '→'.join(f'{figure(one):.{decimals}f}' for one in values)
-
-    def words(excess):
-        most, rare = ((lambda one, part=part: np.quantile(one, part)) for part in (0.9, 0.99))
-        return (f'mean {pair(excess, decimals=2)}, 90 % {pair(excess, most)}, 99 % {pair(excess, rare)}, worst '
-                f'{pair(excess, np.max)} %')
-    groups = {name: both([([case for case in cases.whole_set() if name in (case.name, case.group)], None)])
-              for name in ('lag 35 ms', 'lag 70 ms', 'brake gain 0.8', 'drawn')}
-    return (f'{words(both(draws(kept)))}; after a stop {words(both(draws(kept), True))}. Means of the benchmark: '
-            f'{", ".join(f"{name} {pair(excess, decimals=2)}" for name, excess in groups.items())} %.')
-
-
 def main():
     options = {(): (table, 'drawn.json'), ('--sentences',): (sentences, 'drawn.json'),
-               ('--combined',): (combined, 'combined.json'), ('--lag',): (lag, 'combined.json')}
+               ('--combined',): (combined, 'combined.json')}
     if len(sys.argv) < 2 or tuple(sys.argv[2:]) not in options:
         print(__doc__, file=sys.stderr)
         return 2

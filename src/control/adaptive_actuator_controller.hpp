@@ -4,6 +4,7 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
+#include "control/state_predictor.hpp"
 #include "control/theta_estimator.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
@@ -33,6 +34,7 @@ class AdaptiveActuatorLaw {
   void take_over(const AdaptiveActuatorLaw& before) noexcept;
 
  private:
+  [[nodiscard]] BasicSlipInput<S> acting(const BasicSlipInput<S>& now) const noexcept;
   [[nodiscard]] S gain(const S& slip) const noexcept { return laws_.k({.lambda_ref = slip}); }
   template <class Condition>
   void adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept;
@@ -45,13 +47,15 @@ class AdaptiveActuatorLaw {
   paper::Laws<S> laws_{};
   rig::TyreShape<S> tyre_{};
   BasicBrakeLag<S> lag_{};
+  BasicStatePredictor<S> predictor_{};
   S lag_decay_per_s_{0.0};  ///< mean rate of eta / eta over the period: -lag_gain for h -> 0
   S lag_weight_{0.0};       ///< s^2
   S v_min_m_s_{0.0};
   S period_s_{0.0};
   BasicSlipErrorDynamics<S> dynamics_{};
   paper::Gains<S> gains_{};
-  BasicSlipErrorIntegral<S> integral_{};
+  BasicSlipErrorIntegral<S> measured_{};  ///< of (17)
+  BasicSlipErrorIntegral<S> integral_{};  ///< of (18): the same, at the state that the law acts on
   BasicThetaEstimator<S> theta_{};
   BasicWheelForceObserver<S> wheels_observer_{};
   S omega1_rad_s_{0.0};  ///< of the previous cycle, as is the slip
@@ -62,7 +66,8 @@ class AdaptiveActuatorLaw {
 
 template <class S>
 void AdaptiveActuatorLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
-  integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
+  measured_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
+  integral_ = measured_;
   theta_.reset();
   wheels_observer_.reset(input.speeds);
   omega1_rad_s_ = input.speeds.omega1_rad_s;
@@ -75,16 +80,33 @@ BasicSlipOutput<S> AdaptiveActuatorLaw<S>::step(const BasicSlipInput<S>& raw) no
   const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
   limited_ = rig::select(lags && raw.unsent_torque_Nm != 0.0, S(1.0), S(0.0));
   if (rig::any(lags)) wheels_observer_.update(raw);
-  const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
+  const BasicSlipInput<S> now = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
+  measured_.advance(now, slip_velocity_error_m_s(laws_, now.speeds, now.slip_ref), now.slip_ref,
+                    laws_.r2 * now.speeds.omega2_rad_s);
+  const BasicSlipInput<S> input = acting(now);
   const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
   integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
-  const S past_phi = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
-  adapt(input, past_phi, lags);
+  const S past_phi = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + now.slip)));
+  adapt(now, past_phi, lags);
 
   S torque_Nm =
       dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   if (rig::any(lags)) torque_Nm = rig::select(lags, through_lag(input, torque_Nm, error_m_s), torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
+
+/// What the law acts on: the state as a torque that is sent now begins to act. Only the innovation is of now.
+template <class S>
+BasicSlipInput<S> AdaptiveActuatorLaw<S>::acting(const BasicSlipInput<S>& now) const noexcept {
+  if (now.ahead.torques_Nm.empty()) return now;
+  const ActingState<S> state =
+      predictor_(now.ahead, {now.speeds, now.brake_torque_Nm}, wheels_observer_.brake_error_Nm(), [&](const S& slip) {
+        return CurvePoint<S>{theta_.theta_N() * rig::normalised_tyre_force(tyre_, slip),
+                             theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, slip)};
+      });
+  BasicSlipInput<S> result = with_speeds(now, !rig::is_nan(now.slip), state.speeds, laws_, v_min_m_s_);
+  result.brake_torque_Nm = state.brake_torque_Nm;
+  return result;
 }
 
 /// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ); 0 while the command is limited.
@@ -96,7 +118,7 @@ S AdaptiveActuatorLaw<S>::zeta_rate_N_s(const S& slip_ref, const S& phi, const S
 template <class S>
 template <class Condition>
 void AdaptiveActuatorLaw<S>::adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept {
-  const S BtP_x = paper::Laws<S>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
+  const S BtP_x = paper::Laws<S>::BtP_x(gains_, measured_.mean_value_m(), measured_.mean_error_m_s());
   const S zeta_rate = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x);
   if (rig::any(lags)) {
     const auto known = turns(omega1_rad_s_) && turns(input.speeds.omega1_rad_s) && input.dt_s > 0.0;
@@ -160,6 +182,7 @@ S AdaptiveActuatorLaw<S>::through_lag(const BasicSlipInput<S>& input, const S& w
 
 template <class S>
 void AdaptiveActuatorLaw<S>::take_over(const AdaptiveActuatorLaw& before) noexcept {
+  measured_ = before.measured_;
   integral_ = before.integral_;
   theta_.take_over(before.theta_);
   wheels_observer_.take_over(before.wheels_observer_);

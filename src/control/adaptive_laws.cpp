@@ -1,4 +1,5 @@
 // Makes the adaptive laws from their options and refuses options out of range; the signals of the first.
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -7,6 +8,7 @@
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_gains.hpp"
 #include "control/adaptive_peak_controller.hpp"
+#include "control/adaptive_predictor_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
 
 namespace abs_hil::control {
@@ -21,6 +23,16 @@ ControlOptions with_own_gains(const ControlOptions& options) {
   ControlOptions result = options;
   result.adaptive = own.law;
   return result;
+}
+
+/// Gains that follow from the dead time.
+ControlOptions with_predicted_gains(ControlOptions options, const rig::BrakeParameters& brake) {
+  constexpr double observed_s = 0.016;
+  const PredictedGains most = predicted_gains(std::max(observed_s, brake.brake_dead_time_s));
+  options.adaptive_actuator.law.ks1 = most.slip_most_per_s;
+  options.adaptive_actuator.law.ks0 = 0.25 * most.slip_most_per_s * most.slip_most_per_s;
+  options.adaptive_actuator.lag_gain_per_s = most.torque_most_per_s;
+  return options;
 }
 
 const BrakingStiffnessOptions<>& checked(const BrakingStiffnessOptions<>& o) {
@@ -61,6 +73,7 @@ AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
     : laws_{paper::laws(context.rig.wheels)},
       tyre_{context.rig.tyre},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
+      predictor_{context.rig, context.options.v_min_m_s},
       lag_decay_per_s_{std::expm1(-context.options.adaptive_actuator.lag_gain_per_s / context.options.rate_Hz) *
                        context.options.rate_Hz},
       lag_weight_{context.options.adaptive_actuator.lag_weight_s2},
@@ -72,6 +85,12 @@ AdaptiveActuatorLaw<S>::AdaptiveActuatorLaw(const ControllerContext& context)
       wheels_observer_{context.options.adaptive_actuator.observer, context.rig, context.options.rate_Hz} {}
 
 template class AdaptiveActuatorLaw<double>;
+
+template <class S>
+AdaptivePredictorLaw<S>::AdaptivePredictorLaw(const ControllerContext& context)
+    : AdaptiveActuatorLaw<S>{{with_predicted_gains(context.options, context.rig.brake), context.rig}} {}
+
+template class AdaptivePredictorLaw<double>;
 
 template <class S>
 AdaptivePeakLaw<S>::AdaptivePeakLaw(const ControllerContext& context)

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "control/adaptive_gains.hpp"
+#include "control/rig_scale.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -36,6 +37,20 @@ AdaptiveOptimalOptions<> counted(AdaptiveOptimalOptions<> options, double coarse
   return options;
 }
 
+/// The torques of the options, for a rig whose forces are larger or smaller than those of the paper's.
+AdaptiveOptimalOptions<> scaled(AdaptiveOptimalOptions<> options, const RigScale& scale) {
+  options.play_Nm *= scale.torque;
+  options.torque_near_Nm *= scale.torque;
+  return options;
+}
+
+AdaptiveOptimalOptions<> delayed(AdaptiveOptimalOptions<> options, double dead_time_s) {
+  const PredictedGains most = predicted_gains(dead_time_s);
+  options.slip_gain_per_s = std::min(options.slip_gain_per_s, most.slip_most_per_s);
+  options.torque_gain_per_s = std::min(options.torque_gain_per_s, most.torque_most_per_s);
+  return options;
+}
+
 ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters& rig) noexcept {
   const double limit = rig.brake.brake_rate_limit_Nm_s;
   return {.mass_kg_m = rig.wheels.J1_kg_m2 / rig.wheels.r1_m,
@@ -49,11 +64,16 @@ ProximateTorque loop(const AdaptiveOptimalOptions<>& o, const rig::RigParameters
 
 template <class S>
 AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
-    : options_{counted(with_sound_slips(context.options.adaptive_optimal, "control.adaptive_optimal."),
-                       coarseness(context.rig))},
+    : options_{delayed(counted(scaled(with_sound_slips(context.options.adaptive_optimal, "control.adaptive_optimal."),
+                                      rig_scale(context.rig.wheels)),
+                               coarseness(context.rig)),
+                       context.rig.brake.brake_dead_time_s)},
       laws_{paper::laws(context.rig.wheels)},
       brake_{context.rig.brake},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
+      predictor_{context.rig, context.options.v_min_m_s},
+      dead_time_s_{context.rig.brake.brake_dead_time_s},
+      torque_scale_{rig_scale(context.rig.wheels).torque},
       period_s_{1.0 / context.options.rate_Hz},
       v_min_m_s_{context.options.v_min_m_s},
       loop_{loop(options_, context.rig)},
@@ -61,7 +81,8 @@ AdaptiveOptimalLaw<S>::AdaptiveOptimalLaw(const ControllerContext& context)
       force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
       early_part_{coarseness(context.rig) > 1.0 ? coarse_early_part : 0.0},
       learns_every_{std::max(1.0, std::round(context.options.rate_Hz / learning_rate_Hz))},
-      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
+      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s(),
+            rig_scale(context.rig.wheels).force} {}
 
 template <class S>
 void AdaptiveOptimalLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {

@@ -10,6 +10,7 @@
 #include "control/classic_controllers.hpp"
 #include "control/friction_bank.hpp"
 #include "control/law_controller.hpp"
+#include "control/state_predictor.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
 
@@ -76,6 +77,12 @@ class AdaptiveOptimalLaw {
   using Bank = BasicFrictionBank<S>;
   using Speeds = rig::BasicWheelSpeeds<S>;
 
+  /// What the loop acts on: the state as a command that is sent now begins to act.
+  struct Situation {
+    ActingState<S> state;
+    S slip;
+    S force_N;  ///< that the bank expects there
+  };
   /// The torques that hold the slip: as it is wanted, and as it is.
   struct Holding {
     S wanted_Nm;
@@ -91,13 +98,15 @@ class AdaptiveOptimalLaw {
   [[nodiscard]] S slip_of(const Speeds& speeds) const noexcept;
   void learn(const BasicSlipInput<S>& input, const S& slip) noexcept;
   [[nodiscard]] typename Bank::Swing swing(const S& disc_error_rad, const S& omega_rad_s) const noexcept;
+  [[nodiscard]] Situation ahead(const BasicSlipInput<S>& input, const S& slip) const noexcept;
   [[nodiscard]] S peak_factor() const noexcept;
   [[nodiscard]] S near_gain_per_s() const noexcept;
   [[nodiscard]] S search_part() const noexcept;
   [[nodiscard]] S next_reference(const S& dt_s) noexcept;
   [[nodiscard]] S holding_torque_Nm(const Speeds& speeds, const S& slip, const S& force_N) const noexcept;
-  [[nodiscard]] Holding holding(const S& slip, const S& reference, const S& error_m_s) const noexcept;
-  [[nodiscard]] S dared_torque_Nm(const typename Bank::Force& wanted, const S& wanted_Nm, const S& slip) const noexcept;
+  [[nodiscard]] Holding holding(const Situation& here, const S& reference, const S& error_m_s) const noexcept;
+  [[nodiscard]] S dared_torque_Nm(const typename Bank::Force& wanted, const S& wanted_Nm,
+                                  const Situation& here) const noexcept;
   [[nodiscard]] S wanted_torque_Nm(const Holding& hold, const S& error_m_s, const S& most_Nm) const noexcept;
   [[nodiscard]] S through_lag_Nm(const S& torque_Nm, const S& wanted_Nm) const noexcept;
   [[nodiscard]] S with_play_Nm(const S& torque_Nm, const S& most_Nm) noexcept;
@@ -106,6 +115,9 @@ class AdaptiveOptimalLaw {
   paper::Laws<S> laws_{};
   rig::BasicBrake<S> brake_{};
   BasicBrakeLag<S> lag_{};
+  BasicStatePredictor<S> predictor_{};
+  S dead_time_s_{0.0};
+  S torque_scale_{1.0};
   S period_s_{0.0};
   S v_min_m_s_{0.0};
   BasicProximateTorque<S> loop_{};

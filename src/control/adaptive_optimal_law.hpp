@@ -9,12 +9,15 @@ namespace abs_hil::control {
 
 namespace adaptive_optimal {
 
+// Torques of the paper's rig; others have them times their RigScale.
 inline constexpr double least_hold_Nm = 0.05;  ///< the limits below need a torque that can still fall
 inline constexpr double least_room_Nm = 0.2;   ///< the same for a torque near the brake's largest
 inline constexpr double usual_hold_Nm = 1.0;   ///< before a force is seen
 // The force at the peak is taken as known up to the first relative spread, as unknown from the second on.
 inline constexpr double known_spread = 0.15;
 inline constexpr double unknown_spread = 0.4;
+/// Besides a dead time, until the force shows what a torque does.
+inline constexpr double seen_after_s = 0.01;
 /// Part of a swing once a turn that the observer's force shows.
 inline constexpr double quick_passes = 0.5;
 // The early search begins when the first force has come through the filters, and fades.
@@ -80,11 +83,17 @@ void AdaptiveOptimalLaw<S>::learn(const BasicSlipInput<S>& input, const S& slip)
 }
 
 /// If the slip runs away within the time that the brake takes to act, the reference must not be past the peak, whatever
-/// is expected of it.
+/// is expected of it. Behind a dead time the loop does not swing past the peak by itself, and a flat curve shows its
+/// peak only farther out: there the reference goes on, as long as the slip would not run away within dead time and lag.
 template <class S>
 S AdaptiveOptimalLaw<S>::peak_factor() const noexcept {
-  constexpr double least = 0.75;
-  return rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
+  constexpr double least = 0.75, flat_runaway = 0.12, flat_part = 0.5;
+  const S factor =
+      rig::larger(S(least), 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
+  if (!rig::any(dead_time_s_ > 0.0)) return factor;
+  const S runaway = bank_.runaway() * (1.0 + brake_.c31_per_s * dead_time_s_);
+  const S farther = flat_part * rig::larger(S(0.0), S(1.0 - runaway / flat_runaway));
+  return factor + rig::select(dead_time_s_ > 0.0, farther, S(0.0));
 }
 
 /// Where the slip runs away behind the peak, a search passes the peak and costs more than it finds. But the first noise
@@ -116,7 +125,7 @@ template <class S>
 S AdaptiveOptimalLaw<S>::holding_torque_Nm(const Speeds& speeds, const S& slip, const S& force_N) const noexcept {
   const paper::Reading<S> reading{
       .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip, .phi = S(1.0)};
-  return rig::larger(S(adaptive_optimal::least_hold_Nm),
+  return rig::larger(S(adaptive_optimal::least_hold_Nm * torque_scale_),
                      laws_.T_b(laws_.xi_1(reading, S(0.0), force_N)) + model_error_Nm_);
 }
 
@@ -124,13 +133,18 @@ S AdaptiveOptimalLaw<S>::holding_torque_Nm(const Speeds& speeds, const S& slip, 
 /// that if nothing is known.
 template <class S>
 S AdaptiveOptimalLaw<S>::dared_torque_Nm(const typename Bank::Force& wanted, const S& wanted_Nm,
-                                         const S& slip) const noexcept {
+                                         const Situation& here) const noexcept {
   using namespace adaptive_optimal;
-  const Speeds speeds = observer_.speeds();
-  const S here_Nm = holding_torque_Nm(speeds, slip, rig::larger(S(0.0), bank_.force_N()));
+  const Speeds& speeds = here.state.speeds;
+  const S here_Nm = holding_torque_Nm(speeds, here.slip, rig::larger(S(0.0), here.force_N));
   const S v_x = rig::larger(S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
-  const S bold_Nm = rig::square_root(
-      S(2.0 * options_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s * rig::larger(here_Nm, S(usual_hold_Nm))));
+  S bold_Nm = rig::square_root(S(2.0 * options_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s *
+                                 rig::larger(here_Nm, S(usual_hold_Nm * torque_scale_))));
+  // With a dead time the excess acts that long after its effect on the slip could have shown.
+  if (rig::any(dead_time_s_ > 0.0)) {
+    const S seen_Nm = options_.bold_slip * v_x * loop_.mass_kg_m / (dead_time_s_ + seen_after_s);
+    bold_Nm = rig::select(dead_time_s_ > 0.0, rig::smaller(bold_Nm, seen_Nm), bold_Nm);
+  }
   // A spread that moves the torque by less than the play counts as known, however small the force is.
   const S least_N = options_.play_Nm / (known_spread * laws_.r1);
   const S spread = rig::select(wanted.N > 0.0, S(wanted.spread_N / rig::larger(wanted.N, least_N)), S(unknown_spread));
@@ -139,20 +153,21 @@ S AdaptiveOptimalLaw<S>::dared_torque_Nm(const typename Bank::Force& wanted, con
 }
 
 template <class S>
-auto AdaptiveOptimalLaw<S>::holding(const S& slip, const S& reference, const S& error_m_s) const noexcept -> Holding {
-  const Speeds speeds = observer_.speeds();
+auto AdaptiveOptimalLaw<S>::holding(const Situation& here, const S& reference, const S& error_m_s) const noexcept
+    -> Holding {
+  const Speeds& speeds = here.state.speeds;
   const auto wanted = bank_.at(reference);
   const S wanted_Nm = holding_torque_Nm(speeds, reference, wanted.N);
   Holding hold{wanted_Nm, wanted_Nm};
   const auto past = error_m_s > 0.0;
   if (rig::any(past)) {
     // Past the peak the force falls as the slip grows: the torque has to fall below what holds the slip there.
-    const S& here_N = bank_.force_N();
-    const auto falls = past && here_N < wanted.N;
-    if (rig::any(falls)) hold.here_Nm = rig::select(falls, holding_torque_Nm(speeds, slip, here_N), wanted_Nm);
+    const auto falls = past && here.force_N < wanted.N;
+    if (rig::any(falls))
+      hold.here_Nm = rig::select(falls, holding_torque_Nm(speeds, here.slip, here.force_N), wanted_Nm);
   }
   if (rig::any(!past)) {
-    const S dared_Nm = dared_torque_Nm(wanted, wanted_Nm, slip);
+    const S dared_Nm = dared_torque_Nm(wanted, wanted_Nm, here);
     hold.wanted_Nm = rig::select(past, wanted_Nm, dared_Nm);
     hold.here_Nm = rig::select(past, hold.here_Nm, dared_Nm);
   }
@@ -175,7 +190,7 @@ S AdaptiveOptimalLaw<S>::wanted_torque_Nm(const Holding& hold, const S& error_m_
   if (rig::any(too_little)) wanted_Nm = hold.wanted_Nm + loop_.excess_Nm(size, hold.wanted_Nm, options_.authority);
   if (!rig::any(!too_little)) return wanted_Nm;
   const auto below = [&](const S& torque_Nm, const S& authority) -> S {
-    const S room_Nm = rig::larger(S(adaptive_optimal::least_room_Nm), most_Nm - torque_Nm);
+    const S room_Nm = rig::larger(S(adaptive_optimal::least_room_Nm * torque_scale_), most_Nm - torque_Nm);
     return torque_Nm - loop_.excess_Nm(size, room_Nm, authority);
   };
   return rig::select(
@@ -201,19 +216,30 @@ S AdaptiveOptimalLaw<S>::with_play_Nm(const S& torque_Nm, const S& most_Nm) noex
 }
 
 template <class S>
+auto AdaptiveOptimalLaw<S>::ahead(const BasicSlipInput<S>& input, const S& slip) const noexcept -> Situation {
+  Situation here{{observer_.speeds(), input.brake_torque_Nm}, slip, bank_.force_N()};
+  if (input.ahead.torques_Nm.empty()) return here;
+  // What is missing in the holding torque is missing in the brake's.
+  here.state = predictor_(input.ahead, here.state, S(-model_error_Nm_), [&](const S& at) { return bank_.point(at); });
+  here.slip = slip_of(here.state.speeds);
+  here.force_N = bank_.point(here.slip).N;
+  return here;
+}
+
+template <class S>
 BasicSlipOutput<S> AdaptiveOptimalLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
   observer_.update(input);
-  const Speeds speeds = observer_.speeds();
-  const S slip = slip_of(speeds);
+  const S slip = slip_of(observer_.speeds());
   learn(input, slip);
+  const Situation here = ahead(input, slip);
   loop_.near_per_s = near_gain_per_s();
   const S reference = next_reference(input.dt_s);
-  const S error_m_s = slip_velocity_error_m_s(laws_, speeds, reference);
+  const S error_m_s = slip_velocity_error_m_s(laws_, here.state.speeds, reference);
   const S most_Nm = full_torque_Nm(brake_, input.max_brake_torque_Nm);
-  const S wanted_Nm = wanted_torque_Nm(holding(slip, reference, error_m_s), error_m_s, most_Nm);
+  const S wanted_Nm = wanted_torque_Nm(holding(here, reference, error_m_s), error_m_s, most_Nm);
   const auto lags = rig::is_finite(input.max_brake_torque_Nm);
   const S command_Nm =
-      rig::any(lags) ? rig::select(lags, through_lag_Nm(input.brake_torque_Nm, wanted_Nm), wanted_Nm) : wanted_Nm;
+      rig::any(lags) ? rig::select(lags, through_lag_Nm(here.state.brake_torque_Nm, wanted_Nm), wanted_Nm) : wanted_Nm;
   return {.brake_torque_Nm = with_play_Nm(command_Nm, most_Nm),
           .slip_velocity_error_m_s = error_m_s,
           .theta_est_N = bank_.peak_force_N(),

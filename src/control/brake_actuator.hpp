@@ -2,10 +2,15 @@
 // board has.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
 
+#include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/scalar.hpp"
 
@@ -112,7 +117,10 @@ class BrakeActuator : public BasicBrakeActuator<double> {
   BrakeActuator() = default;
   BrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty, std::uint32_t duty_steps = 0)
       : BasicBrakeActuator(brake, ideal, max_duty, duty_steps),
-        delay_(ideal ? rig::BrakeDelay() : rig::BrakeDelay(brake)) {}
+        brake_(brake),
+        delay_(ideal ? rig::BrakeDelay() : rig::BrakeDelay(brake)),
+        parts_(delay_.any() ? parts_of(brake) : 0),
+        part_s_(parts_ > 0 ? horizon_s(brake) / static_cast<double>(parts_) : 0.0) {}
 
   void reset() noexcept {
     BasicBrakeActuator::reset();
@@ -135,13 +143,45 @@ class BrakeActuator : public BasicBrakeActuator<double> {
     });
     if (dt_s > 0.0) mean_torque_Nm_ = impulse_Nms / dt_s;
   }
+  /// The static torques that act until one that is sent now acts, for SlipInput.
+  [[nodiscard]] BasicBrakeAhead<double> ahead() noexcept {
+    if (parts_ == 0) [[likely]]
+      return {};
+    ahead_Nm_.fill(0.0);
+    double passed_s = 0.0;
+    delay_.foresee(part_s_ * static_cast<double>(parts_), [&](double duty, double time_s) {
+      const double torque_Nm = rig::brake_torque_at(brake_, duty);
+      for (const double until_s = passed_s + time_s; passed_s < until_s;) {
+        const auto part = std::min(parts_ - 1, static_cast<std::size_t>(passed_s / part_s_ + rounding));
+        const double end_s = part + 1 < parts_ ? std::min(until_s, static_cast<double>(part + 1) * part_s_) : until_s;
+        ahead_Nm_[part] += torque_Nm * (end_s - passed_s) / part_s_;
+        passed_s = end_s;
+      }
+    });
+    return {{ahead_Nm_.data(), parts_}, part_s_};
+  }
   void exchange_state(rig::StateBytes& state) {
     state(static_cast<BasicBrakeActuator<double>&>(*this));
     delay_.exchange_state(state);
   }
 
  private:
+  // A part is about as long as three cycles at 1 kHz, within which the slip's motion is nearly linear.
+  static constexpr double usual_part_s = 6e-3;
+  static constexpr std::size_t most_parts = 16;
+  static constexpr double rounding = 1e-9;
+
+  [[nodiscard]] static double horizon_s(const rig::BrakeParameters& brake) noexcept { return brake.brake_dead_time_s; }
+  [[nodiscard]] static std::size_t parts_of(const rig::BrakeParameters& brake) noexcept {
+    const double parts = std::ceil(horizon_s(brake) / usual_part_s - rounding);
+    return static_cast<std::size_t>(std::clamp(parts, 1.0, static_cast<double>(most_parts)));
+  }
+
+  rig::BasicBrake<double> brake_{};
   rig::BrakeDelay delay_{};
+  std::size_t parts_{0};
+  double part_s_{0.0};
+  std::array<double, most_parts> ahead_Nm_{};
 };
 
 template <class S>

@@ -24,15 +24,29 @@ double belief(double peak, double median, double spread) noexcept {
   return x > least ? rig::exponential(x) : 0.0;
 }
 
+FrictionBankOptions<> scaled(FrictionBankOptions<> options, double force_scale) {
+  rig::require_valid(options, "control.adaptive_optimal.");
+  for (double* force_N : {&options.level0_N, &options.level_spread_N, &options.jump_least_N}) *force_N *= force_scale;
+  options.force_noise_N2_s *= force_scale * force_scale;
+  options.zero_error_per_N /= force_scale;
+  return options;
+}
+
 void set(auto& row, std::size_t j, double value) noexcept { row.v[j / 2][j % 2] = value; }
 double number(const auto& row, std::size_t j) noexcept { return row.v[j / 2][j % 2]; }
 
 }  // namespace
 
 template <class S>
-BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions<>& o, double rate_Hz, double quick_delay_s)
-    : options_{o}, rate_Hz_{rate_Hz}, quick_delay_s_{quick_delay_s} {
-  rig::require_valid(o, "control.adaptive_optimal.");
+BasicFrictionBank<S>::BasicFrictionBank(const FrictionBankOptions<>& o, double rate_Hz, double quick_delay_s,
+                                        double force_scale)
+    : options_{scaled(o, force_scale)},
+      rate_Hz_{rate_Hz},
+      quick_delay_s_{quick_delay_s},
+      theta_least_N_{friction_bank::theta_min_N * force_scale},
+      theta_most_N_{friction_bank::theta_max_N * force_scale},
+      theta_variance_least_N2_{friction_bank::theta_variance_min_N2 * force_scale * force_scale},
+      seen_N_{friction_bank::seen_N * force_scale} {
   if (!(rate_Hz > 0.0 && quick_delay_s > 0.0)) {
     throw std::invalid_argument("the friction bank needs a control rate and a delay of the quick force > 0");
   }

@@ -38,6 +38,7 @@
 #include "abs_hil/rig/scalar.hpp"
 #include "control/friction_curves.hpp"
 #include "control/lower_wheel_force.hpp"
+#include "control/state_predictor.hpp"
 #include "rig/pack.hpp"
 
 namespace abs_hil::control {
@@ -53,7 +54,9 @@ class BasicFrictionBank {
   BasicFrictionBank() = default;
   /// @param quick_delay_s  by which `Data::quick_force_N` follows the force, > 0
   /// Throws std::invalid_argument for options out of range.
-  BasicFrictionBank(const FrictionBankOptions<>& options, double rate_Hz, double quick_delay_s);
+  /// @param force_scale  of the rig (RigScale), > 0, which all forces of the options are multiplied with
+  BasicFrictionBank(const FrictionBankOptions<>& options, double rate_Hz, double quick_delay_s,
+                    double force_scale = 1.0);
 
   /// Amplitudes of the once-a-turn errors that encoder discs off their centres may cause; 0: the discs are known.
   struct Swing {
@@ -90,6 +93,8 @@ class BasicFrictionBank {
   };
   /// Expected force at a reading of the slip.
   [[nodiscard]] Force at(const S& slip) const noexcept;
+  /// The same without its spread, and its slope over the slip.
+  [[nodiscard]] CurvePoint<S> point(const S& slip) const noexcept;
   /// Expected force at the last reading.
   [[nodiscard]] const S& force_N() const noexcept { return force_N_; }
   /// The slip at which the expected loss of force is least. It counts from no force: the reading there is this less
@@ -213,6 +218,8 @@ class BasicFrictionBank {
   FrictionBankOptions<S> options_{};
   S rate_Hz_{0.0};
   S quick_delay_s_{0.0};
+  S theta_least_N_{0.0}, theta_most_N_{0.0}, theta_variance_least_N2_{0.0};
+  S seen_N_{0.0};
   S last_dt_s_{0.0};
   S quick_covered_{0.0};  ///< of its distance, by the delay of the quick force in `last_dt_s_`
   Words prior_{};         ///< the same for all shapes

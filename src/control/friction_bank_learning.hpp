@@ -7,7 +7,7 @@ namespace abs_hil::control {
 
 namespace friction_bank {
 
-// Bounds of the unknowns.
+// Bounds of the unknowns. Forces are those of the paper's rig; others have them times their RigScale.
 inline constexpr double theta_min_N = 2.0;
 inline constexpr double theta_max_N = 500.0;
 inline constexpr double zero_max = 0.025;  ///< as it is read
@@ -127,7 +127,7 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
                        rig::square_root(Row(look.noise_N2 * per));
       weight = rig::select(compares, seen, weight);
     }
-    theta_N = rig::select(learns, within(theta_N + gain_theta * residual, theta_min_N, theta_max_N), theta_N);
+    theta_N = rig::select(learns, within(theta_N + gain_theta * residual, theta_least_N_, theta_most_N_), theta_N);
     const Row moved = rig::select(learns, within(zero + gain_zero * residual, zero_least_, zero_most_), zero);
     // What is on its way through the filter was computed with the old zero.
     const Row shift = by_slip[row] * (moved - zero);
@@ -137,7 +137,7 @@ void BasicFrictionBank<S>::learn(const Look& look, Condition learns, Condition c
     zero = moved;
     // Rounding must not make the covariance indefinite.
     theta_variance = rig::select(
-        learns, rig::larger(Row(theta_variance_min_N2), theta_variance - gain_theta * reach_theta), theta_variance);
+        learns, rig::larger(Row(theta_variance_least_N2_), theta_variance - gain_theta * reach_theta), theta_variance);
     zero_variance =
         rig::select(learns, rig::larger(Row(zero_variance_min), zero_variance - gain_zero * reach_zero), zero_variance);
     const Row most = rig::square_root(Row(theta_variance * zero_variance));
@@ -152,14 +152,14 @@ void BasicFrictionBank<S>::follow_jump(const Condition& where, const S& dt_s, co
   using friction_curves::square;
   hold_s_ = rig::select(where, S(hold_s_ - dt_s), hold_s_);
   // A force near 0 or below tells nothing of the level.
-  const auto seen = where && late_force_N_ > seen_N;
+  const auto seen = where && late_force_N_ > seen_N_;
   if (rig::any(seen)) {
     const S covered = -rig::exponential_less_one(S(-dt_s / options_.jump_time_constant_s));
     const S factor = rig::clamped(S(1.0 + covered * residual_N / late_force_N_), S(largest_fall), S(largest_rise));
     for (Members& m : bank_) {
       for (std::size_t row = 0; row < rows_a_shape; ++row) {
         Row& theta_N = row_of(m.theta_N, row);
-        theta_N = rig::select(seen, within(theta_N * factor, theta_min_N, theta_max_N), theta_N);
+        theta_N = rig::select(seen, within(theta_N * factor, theta_least_N_, theta_most_N_), theta_N);
       }
     }
     late_force_N_ = rig::select(seen, S(late_force_N_ * factor), late_force_N_);
@@ -238,8 +238,27 @@ void BasicFrictionBank<S>::summarise(const S& runaway_per_N) noexcept {
   runaway_ = per * runaways.value();
   slip_zero_ = per * zeros.value();
   // A mean, but for rounding.
-  peak_force_N_ = rig::clamped(S(per * thetas.value()), S(theta_min_N), S(theta_max_N));
+  peak_force_N_ = rig::clamped(S(per * thetas.value()), theta_least_N_, theta_most_N_);
   force_N_ = per * forces.value();
+}
+
+template <class S>
+CurvePoint<S> BasicFrictionBank<S>::point(const S& slip) const noexcept {
+  Sum values, slopes;
+  for (std::size_t row = 0; row < rows_a_shape; ++row) {
+    Row row_values(0.0), row_slopes(0.0);
+    for (std::size_t shape = 0; shape < shapes; ++shape) {
+      const Members& m = bank_[shape];
+      const Row knee = numbers(friction_curves::derived.knee[shape], row);
+      const Row at = slip + row_of(m.zero, row);
+      const Row height = row_of(m.weight, row) * row_of(m.theta_N, row);
+      row_values = row_values + height * friction_curves::value(shape, knee, at);
+      row_slopes = row_slopes + height * friction_curves::slope(shape, knee, at);
+    }
+    values.add(row, row_values);
+    slopes.add(row, row_slopes);
+  }
+  return {values.value(), slopes.value()};
 }
 
 template <class S>

@@ -12,6 +12,7 @@
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
+#include "control/adaptive_predictor_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
 #include "control/classic_controllers.hpp"
 #include "control/five_phase_controller.hpp"
@@ -33,6 +34,7 @@ constexpr std::array own_table{
     law_entry<AdaptiveLaw>("adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
     law_entry<AdaptiveActuatorLaw>("adaptive-actuator",
                                    "adaptive slip control that steps back through the brake's lag (6)"),
+    law_entry<AdaptivePredictorLaw>("adaptive-predictor", "the same with gains that follow from the brake's dead time"),
     law_entry<AdaptivePeakLaw>("adaptive-peak", "seeks the slip of peak friction by itself, told nothing of the tyre"),
     law_entry<AdaptiveOptimalLaw>(
         "adaptive-optimal", "brakes at the unknown peak of friction, and moves the brake as little as that allows"),

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <stdexcept>
 
+#include "control/rig_scale.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {
@@ -12,15 +13,15 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Gain = Eigen::Matrix<double, 6, 2>;
 
-/// Transition of (angle1, omega1, angle2, omega2, F, D) over `dt`.
-Matrix6 transition(const rig::WheelParameters& w, double dt) {
+/// Transition of (angle1, omega1, angle2, omega2, F, D) over `dt`, F and D in units of the rig's scale.
+Matrix6 transition(const rig::WheelParameters& w, const RigScale& scale, double dt) {
   Matrix6 rate = Matrix6::Zero();
   rate(0, 1) = rate(2, 3) = 1.0;
   rate(1, 1) = -w.d1_Nms_rad / w.J1_kg_m2;
-  rate(1, 4) = w.r1_m / w.J1_kg_m2;
-  rate(1, 5) = -1.0 / w.J1_kg_m2;
+  rate(1, 4) = w.r1_m * scale.force / w.J1_kg_m2;
+  rate(1, 5) = -scale.torque / w.J1_kg_m2;
   rate(3, 3) = -w.d2_Nms_rad / w.J2_kg_m2;
-  rate(3, 4) = -w.r2_m / w.J2_kg_m2;
+  rate(3, 4) = -w.r2_m * scale.force / w.J2_kg_m2;
   const Matrix6 step = rate * dt;
   return Matrix6::Identity() + step + step * step / 2.0 + step * step * step / 6.0;
 }
@@ -69,7 +70,8 @@ BasicWheelForceObserver<S>::BasicWheelForceObserver(const ForceObserverOptions<>
     throw std::invalid_argument("the force observer's noise intensities and the control rate (Hz) must be > 0");
   }
   const double dt = 1.0 / rate_Hz;
-  const Matrix6 A = transition(rig.wheels, dt);
+  const RigScale scale = rig_scale(rig.wheels);
+  const Matrix6 A = transition(rig.wheels, scale, dt);
   Matrix6 Q = Matrix6::Zero();
   Q(4, 4) = options.force_rate_N2_s * dt;
   Q(5, 5) = options.brake_rate_Nm2_s * dt;
@@ -78,6 +80,10 @@ BasicWheelForceObserver<S>::BasicWheelForceObserver(const ForceObserverOptions<>
   for (std::size_t i = 0; i != state_.size(); ++i) {
     upper_gain_[i] = gain(static_cast<Eigen::Index>(i), 0);
     lower_gain_[i] = gain(static_cast<Eigen::Index>(i), 1);
+  }
+  for (auto* gains : {&upper_gain_, &lower_gain_}) {
+    (*gains)[force] *= scale.force;
+    (*gains)[brake_error] *= scale.torque;
   }
   force_delay_s_ = ramp_delay(A, gain, dt);
 }

@@ -181,7 +181,8 @@ double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state
                            .lower_travel_rad = lower_travel_rad_,
                            .disc_error_rad = disc_error_rad_,
                            .sent_brake_torque_Nm = begins ? 0.0 : sent_Nm_,
-                           .unsent_torque_Nm = begins ? 0.0 : unsent_Nm_};
+                           .unsent_torque_Nm = begins ? 0.0 : unsent_Nm_,
+                           .ahead = actuator_.ahead()};
   if (begins) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
   if (refused(output, begins)) return 0.0;

@@ -39,7 +39,7 @@ class BadInput(ProgramTest):
 
     def test_configuration_values(self):
         self.refused(['--set', 'plant.thetaN=3'], ['plant.thetaN', 'plant.theta_N'])
-        self.refused(['--set', 'plant.theta_N=-5'], ['plant.theta_N', '-5', '(0, 500]', 'N'])
+        self.refused(['--set', 'plant.theta_N=-5'], ['plant.theta_N', '-5', '(0, 100000]', 'N'])
         self.refused(['--set', 'plant.theta_N=nan'], ['plant.theta_N', 'nan'])
         self.refused(['--set', 'plant.theta_N=abc'], ['plant.theta_N', 'abc'])
         self.refused(['--set', 'control.rate_Hz=0'], ['control.rate_Hz', '[100, 10000]'])

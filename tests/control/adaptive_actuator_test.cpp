@@ -120,3 +120,15 @@ TEST_CASE("At the brake's limit the integral does not wind up") {
   }
   CHECK(most < 0.9);
 }
+
+TEST_CASE("Behind a dead time of 27 ms adaptive-predictor needs 4 % more than the optimum, and no key") {
+  constexpr double dead_s = 0.027, optimum_m = 15.622 + 170.0 * 0.0990 * dead_s;
+  auto s = bench::Setup{.ideal_actuator = false, .encoders = true, .plant_step_s = 1e-4};
+  s.options.slip_ref = 0.05;  // the tyre's peak
+  s.rig.brake.brake_dead_time_s = dead_s;
+  const auto run = bench::brake(s, "adaptive-predictor");
+  CHECK(run.stop_distance_m < 1.04 * optimum_m);
+  s.plant = s.rig;
+  s.rig.brake.brake_dead_time_s = 0.0;
+  CHECK(bench::brake(s, "adaptive-predictor").stop_distance_m > 1.15 * optimum_m);
+}

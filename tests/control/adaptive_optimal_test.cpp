@@ -52,6 +52,45 @@ TEST_CASE("Table 1 from 170 rad/s: within 4 % of the causal optimum of 15.62 m, 
   }
 }
 
+TEST_CASE("Behind a dead time: near the optimum, which coasts so much longer, also where it is told 30 % wrong") {
+  constexpr double dead_s = 0.024, optimum_m = 15.622 + 170.0 * 0.0990 * dead_s;
+  auto s = real_rig();
+  s.plant->brake.brake_dead_time_s = dead_s;
+  s.omega1_start = s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m;  // no slip, as after coasting
+  const auto told = [&](double part) {
+    s.rig.brake.brake_dead_time_s = part * dead_s;
+    return measured(s);
+  };
+  const Braking right = told(1.0);
+  CHECK(right.distance_m < 1.045 * optimum_m);
+  CHECK(right.largest_slip < 0.25);
+  for (const double part : {0.7, 1.3}) {
+    CAPTURE(part);
+    CHECK(told(part).distance_m < 1.085 * optimum_m);
+  }
+  CHECK(told(0.0).distance_m > 1.2 * optimum_m);  // what a law without a predictor needs
+}
+
+TEST_CASE(
+    "All forces times ten and a tenth: the same distance and times the same torque, with a dead time and without") {
+  for (const double dead_s : {0.0, 0.02}) {
+    const auto braked = [&](double factor) {
+      auto s = real_rig();
+      s.rig.brake.brake_dead_time_s = s.plant->brake.brake_dead_time_s = dead_s;
+      scale_forces(s.rig, factor);
+      scale_forces(*s.plant, factor);
+      return measured(s);
+    };
+    const Braking as_it_is = braked(1.0);
+    for (const double factor : {0.1, 10.0}) {
+      CAPTURE(dead_s, factor);
+      const Braking run = braked(factor);
+      CHECK_THAT(run.distance_m, WithinRel(as_it_is.distance_m, 1e-6));
+      CHECK_THAT(run.variation_Nm, WithinRel(factor * as_it_is.variation_Nm, 1e-4));
+    }
+  }
+}
+
 TEST_CASE("adaptive-optimal uses neither tyre parameters nor the slip reference: no bit changes") {
   auto s = real_rig();
   const auto first = bench::brake(s, "adaptive-optimal");

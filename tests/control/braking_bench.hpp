@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -112,6 +113,14 @@ inline void note_sent(control::SlipInput& next, double torque_Nm) {
   next.unsent_torque_Nm = torque_Nm - next.sent_brake_torque_Nm;
 }
 
+/// The same rig with all forces times `factor`.
+inline void scale_forces(rig::RigParameters& rig, double factor) {
+  auto& w = rig.wheels;
+  for (double* force : {&w.J1_kg_m2, &w.J2_kg_m2, &w.d1_Nms_rad, &w.d2_Nms_rad, &w.M10_Nm, &w.M20_Nm, &rig.brake.b1_Nm,
+                        &rig.brake.b2_Nm, &rig.tyre.theta_N})
+    *force *= factor;
+}
+
 /// Brakes with `controller` from the start speeds until v_x < v_min, as the runtime does cycle by cycle.
 inline Result brake(const Setup& s, control::SlipController& controller) {
   const double h = 1.0 / s.options.rate_Hz;
@@ -140,7 +149,9 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
   double v_before = 0.0;
   rig::WheelSpeeds speeds_before{s.omega1_start, s.omega2_start};
   double angle1_before = x.angle1, angle2_before = x.angle2;
-  double unsent_Nm = 0.0;
+  double sent_Nm = 0.0, unsent_Nm = 0.0;
+  // Torques that do not act yet: the true rig's dead time, in whole cycles.
+  std::deque<double> ahead_Nm(static_cast<std::size_t>(std::lround(s.true_rig().brake.brake_dead_time_s / h)), 0.0);
   const auto travel = [&](double now, double before) {
     if (!s.encoders) return now - before;
     return (counts_at(now, per_rev) - counts_at(before, per_rev)) * 2 * std::numbers::pi / per_rev;
@@ -171,8 +182,9 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
         .alpha2_rad_s2 = s.encoders ? lower.alpha_rad_s2() : (speeds.omega2_rad_s - speeds_before.omega2_rad_s) / h,
         .upper_travel_rad = travel(x.angle1, angle1_before),
         .lower_travel_rad = travel(x.angle2, angle2_before),
-        .sent_brake_torque_Nm = actuator.sent_torque_Nm(),
-        .unsent_torque_Nm = unsent_Nm};
+        .sent_brake_torque_Nm = sent_Nm,
+        .unsent_torque_Nm = unsent_Nm,
+        .ahead = actuator.ahead()};
     angle1_before = x.angle1;
     angle2_before = x.angle2;
     speeds_before = speeds;
@@ -181,7 +193,8 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     const double wanted = actuator.limited(output.brake_torque_Nm);
     const double duty = actuator.duty_for(wanted);
     actuator.command(duty, wanted);
-    unsent_Nm = actuator.unsent_Nm(output.brake_torque_Nm, wanted, actuator.sent_torque_Nm());
+    sent_Nm = actuator.static_torque_Nm(duty, wanted);
+    unsent_Nm = actuator.unsent_Nm(output.brake_torque_Nm, wanted, sent_Nm);
     result.ticks.push_back({t, x.omega1, x.omega2, slip, x.torque, x.way, input, output, wanted});
     if (t > 0.3 && v_x > 3.0) {
       square_sum += std::pow(slip - s.options.slip_ref, 2);
@@ -195,7 +208,9 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     const double theta = s.theta_at ? s.theta_at(t + h / 2) : s.true_rig().tyre.theta_N;
     const auto& b = s.true_rig().brake;
     const double map_Nm = duty >= b.u0 ? b.b1_Nm * duty + b.b2_Nm : 0.0;  // (7)
-    integrate(x, s, theta, s.ideal_actuator ? wanted : map_Nm, h);
+    ahead_Nm.push_back(s.ideal_actuator ? wanted : map_Nm);
+    integrate(x, s, theta, ahead_Nm.front(), h);
+    ahead_Nm.pop_front();
   }
   if (square_count > 0) result.slip_rms = std::sqrt(square_sum / square_count);
   return result;

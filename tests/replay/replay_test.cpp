@@ -131,9 +131,10 @@ std::string content(const std::filesystem::path& path) {
 
 TEST_CASE("a recorded run is reproduced bit by bit with any controller and rate") {
   const TemporaryFolder scratch;
-  for (const char* controller : {"adaptive", "adaptive-actuator", "adaptive-optimal", "adaptive-peak", "nominal",
-                                 "sliding-mode", "sliding-mode-smooth", "super-twisting", "pi",
-                                 "mixed-slip-deceleration", "braking-stiffness", "relay", "five-phase", "locked"}) {
+  for (const char* controller :
+       {"adaptive", "adaptive-actuator", "adaptive-optimal", "adaptive-peak", "adaptive-predictor", "nominal",
+        "sliding-mode", "sliding-mode-smooth", "super-twisting", "pi", "mixed-slip-deceleration", "braking-stiffness",
+        "relay", "five-phase", "locked"}) {
     INFO(controller);
     record_run(scratch / "run.lcmlog", {{std::string("control.controller=") + controller, "control.rate_Hz=700"}});
     const RecordedRun run = read_run(scratch / "run.lcmlog");

@@ -50,7 +50,7 @@ TEST_CASE("bad studies are refused with line and column") {
       {"[factors]\nplant.theta = [1]", "2:7", {"plant.theta_N"}},
       {"[factors]\nplant.theta_N = 20", "2:17", {"give a list of values"}},
       {"[factors]\nplant.theta_N = []", "2:17", {"give a list of values"}},
-      {"[factors]\nplant.theta_N = [20,\n -1]", "3:2", {"plant.theta_N = -1", "(0, 500]"}},
+      {"[factors]\nplant.theta_N = [20,\n -1]", "3:2", {"plant.theta_N = -1", "(0, 100000]"}},
       {"[factors]\nplant.theta_N = [[1]]", "2:18", {"neither a number"}},
       {"[factors]\nplant.theta_N = { from = 20 }", "2:17", {"has no to"}},
       {"[factors]\nplant.theta_N = { from = 20, to = 900 }", "2:17", {"plant.theta_N = 900"}},

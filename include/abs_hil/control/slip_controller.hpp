@@ -10,6 +10,14 @@
 
 namespace abs_hil::control {
 
+/// Static torques b(u) on their way through the brake's dead time, as means over equal parts of the time until a torque
+/// that is sent now acts, the nearest part first. Empty without dead time. Valid during the call that it is given to.
+template <class S>
+struct BasicBrakeAhead {
+  std::span<const S> torques_Nm{};
+  double part_s{0.0};
+};
+
 /// Inputs of a slip controller in one cycle. SI units. `S` is a `double` in a run of its own, and a pack of them where
 /// many simulated runs are computed side by side (rig/scalar.hpp).
 template <class S>
@@ -37,6 +45,8 @@ struct BasicSlipInput {
   /// rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two, and in the
   /// first cycle of a phase. While it is not 0, an integral that drives the output further out must stand.
   S unsent_torque_Nm{0.0};
+  /// What was sent and does not act yet; nothing if the model of the brake has no dead time, or the actuator is ideal.
+  BasicBrakeAhead<S> ahead{};
 };
 using SlipInput = BasicSlipInput<double>;
 

@@ -116,6 +116,17 @@ class BrakeDelay {
       left_s -= part_s;
     }
   }
+  /// Calls `each(duty, part_s)` for the parts of a time from now on, in order, as they are if nothing else is sent.
+  template <class Each>
+  void foresee(double time_s, const Each& each) const {
+    double duty = duty_, passed_s = 0.0;
+    for (std::size_t n = 0; n < count_ && at(n).due_s - time_s_ < time_s; ++n) {
+      each(duty, at(n).due_s - time_s_ - passed_s);
+      passed_s = at(n).due_s - time_s_;
+      duty = at(n).duty;
+    }
+    each(duty, time_s - passed_s);
+  }
   void exchange_state(StateBytes& state) { state(changes_, first_, count_, time_s_, newest_, duty_); }
 
  private:

@@ -17,10 +17,10 @@ struct WheelParameters {
                  .on_rig = "as r1_m; an error of one radius against the other shifts every slip");
   ABS_HIL_OPTION(
       double, J1_kg_m2, 7.54e-3, .unit = "kg m^2", .meaning = "upper wheel moment of inertia",
-      .range = between(1e-4, 1),
+      .range = between(1e-4, 100),
       .on_rig = "lifted upper wheel: known brake torque over deceleration; or computed from drawing and mass");
   ABS_HIL_OPTION(double, J2_kg_m2, 25.60e-3, .unit = "kg m^2", .meaning = "lower wheel moment of inertia",
-                 .range = between(1e-4, 1), .on_rig = "computed from drawing and mass, or swung as a pendulum");
+                 .range = between(1e-4, 1000), .on_rig = "computed from drawing and mass, or swung as a pendulum");
   ABS_HIL_OPTION(double, d1_Nms_rad, 118.74e-6, .unit = "N m s/rad", .meaning = "upper wheel viscous friction",
                  .range = from_zero(0.1),
                  .on_rig = "run-out of the lifted upper wheel: slope of deceleration over speed, times J1");
@@ -42,7 +42,7 @@ struct TyreParameters {
   bool operator==(const TyreParameters&) const = default;
   ABS_HIL_OPTION(double, theta_N, 23.0, .unit = "N",
                  .meaning = "peak tyre force, theta = mu D of (10); a plant with load lever does not use it",
-                 .range = positive(500),
+                 .range = positive(1e5),
                  .on_rig = "largest braking force while the slip rises slowly: experiment slip-sweep");
   ABS_HIL_OPTION(double, B, 28.0, .meaning = "tyre stiffness factor of (4)", .range = positive(200),
                  .on_rig = "initial slope of force over slip, divided by theta and C: experiment slip-sweep");
@@ -55,10 +55,10 @@ struct TyreParameters {
 struct BrakeParameters {
   ABS_HIL_OPTIONS(BrakeParameters);
   bool operator==(const BrakeParameters&) const = default;
-  ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1000),
+  ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1e5),
                  .on_rig = "steady brake torque at several duties, by a spring balance at the rim: slope over duty");
   ABS_HIL_OPTION(double, b2_Nm, -6.21, .unit = "N m", .meaning = "offset of the brake map (7)",
-                 .range = between(-1000, 1000), .on_rig = "the same line: its value at duty 0, below zero");
+                 .range = between(-1e5, 1e5), .on_rig = "the same line: its value at duty 0, below zero");
   ABS_HIL_OPTION(double, u0, 0.415, .meaning = "brake duty below which there is no torque (7)",
                  .range = from_zero_below(1),
                  .on_rig = "raise the brake duty slowly until the turning wheel slows down");

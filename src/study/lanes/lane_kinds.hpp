@@ -10,6 +10,7 @@
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
+#include "control/adaptive_predictor_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
 #include "control/classic_controllers.hpp"
 #include "control/five_phase_controller.hpp"
@@ -31,6 +32,7 @@
   ABS_HIL_LANE_PLANTS(each, control::LockedLaw)                \
   ABS_HIL_LANE_PLANTS(each, control::SlidingModeActuatorLaw)   \
   ABS_HIL_LANE_PLANTS(each, control::AdaptiveActuatorLaw)      \
+  ABS_HIL_LANE_PLANTS(each, control::AdaptivePredictorLaw)     \
   ABS_HIL_LANE_PLANTS(each, control::AdaptivePeakLaw)          \
   ABS_HIL_LANE_PLANTS(each, control::AdaptiveOptimalLaw)       \
   ABS_HIL_LANE_PLANTS(each, control::MixedSlipDecelerationLaw) \
