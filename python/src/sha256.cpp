@@ -1,7 +1,7 @@
 // SHA-256 by Python's hashlib: the simulation core links no library that has one.
-#include <pybind11/pybind11.h>
-
 #include "run_folder/sha256.hpp"
+
+#include <pybind11/pybind11.h>
 
 namespace abs_hil::run_folder {
 
