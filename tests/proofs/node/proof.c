@@ -42,20 +42,21 @@ void prove_take_command(void) {
 }
 
 /* Any number of calls at any times by a clock of 64 bits, so that its lower 32 wrap; one at least every 2^31 us. `last` is
-   that clock at the last feed or activation; `seen` what the node has noted of it, the same or an earlier one. */
+   that clock at the last feed or activation; `seen` what the node has noted of it, the same or an earlier one. `over`: 20 ms
+   have passed since then without an activation; `fed`: a feed has come since they had passed. */
 void prove_world(void) {
   struct node_core node;
   struct node_identity identity;
   uint8_t answer[NODE_MOST_BYTES], datagram[MOST_LENGTH];
   uint64_t now = 0, last = 0, seen = 0;
-  bool ever = false, over = true;
+  bool ever = false, fed = false, over = true;
   node_init(&node, &identity);
   ghost_feed = ghost_open = false;
   while (any_bool())
-    __CPROVER_assigns(node, now, last, seen, ever, over, ghost_feed, ghost_open, __CPROVER_object_whole(answer),
+    __CPROVER_assigns(node, now, last, seen, ever, fed, over, ghost_feed, ghost_open, __CPROVER_object_whole(answer),
                       __CPROVER_object_whole(datagram))
     __CPROVER_loop_invariant(BETWEEN(&node) && seen <= last && last <= now && now < 1ULL << 62 &&
-                             (!over || node.latched) &&
+                             (!over || node.latched) && (!node.armed || fed) &&
                              (!(node.armed || !node.latched) ||
                               (ever && node.fed_us == (uint32_t)seen &&
                                now - seen < (node.armed ? node.allowed_us : NODE_LONGEST_US))))
@@ -69,7 +70,10 @@ void prove_world(void) {
       continue;
     }
     now += step;
-    if (now - last >= NODE_LONGEST_US) over = true;
+    if (now - last >= NODE_LONGEST_US) {
+      over = true;
+      fed = false;
+    }
     ghost_feed = ghost_open = false;
     if (what == 1) {
       node_poll(&node, (uint32_t)now);
@@ -81,12 +85,14 @@ void prove_world(void) {
       ever = true;
       if (node.fed_us == (uint32_t)now) seen = now;
     }
+    if (ghost_feed) fed = true;
     if (ghost_open) over = false;
     const bool on = node_duty(&node, 0) != 0 || node_duty(&node, 1) != 0 || node_output(&node) ||
                     node_drives(&node, 0) || node_drives(&node, 1);
     __CPROVER_assert(!on || (ever && now - last < NODE_LONGEST_US),
                      "CLAIM 20 ms after the last feed or activation every output is off");
     __CPROVER_assert(!on || !over, "CLAIM and stays off until an activation");
+    __CPROVER_assert(!on || fed, "CLAIM and until a feed");
 #ifdef COVER /* each must fail: the world has such a state */
     __CPROVER_assert(!on, "COVER an output is on");
     __CPROVER_assert(on || over || !ghost_feed, "COVER fed and activated, and all is off");
