@@ -24,6 +24,7 @@
 #include "driver/monotonic_time.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/linux_process.hpp"
+#include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
@@ -191,6 +192,22 @@ void end_owners(std::vector<BoardOwner>& owners,
     if (done) return;
     static_cast<void>(::poll(nullptr, 0, pause_ms));
   }
+}
+
+std::vector<std::string> end_unguarded(const std::vector<std::string>& files, pid_t holder) {
+  constexpr std::int64_t ends_within_ns = 20 * rig::ns_per_ms;
+  std::vector<BoardOwner> owners = owners_of({files});
+  if (owners.size() > 1) std::erase_if(owners, [holder](const BoardOwner& owner) { return owner.pid == holder; });
+  const auto must_go = [](auto, std::int64_t asked_ns) { return driver::monotonic_ns() > asked_ns + ends_within_ns; };
+  end_owners(owners, must_go);
+  std::vector<std::string> done;
+  for (const BoardOwner& owner : owners) {
+    done.push_back("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
+                   ") drove the board without being guarded, and " +
+                   (owner.ended ? "was ended" : "could not be ended"));
+  }
+  if (owners.empty()) done.emplace_back("something drives the board, and no process of this computer has it open");
+  return done;
 }
 
 }  // namespace abs_hil::guardian

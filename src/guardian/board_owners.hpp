@@ -36,4 +36,9 @@ struct BoardOwner {
 void end_owners(std::vector<BoardOwner>& owners,
                 const std::function<bool(std::size_t board, std::int64_t asked_ns)>& must_go);
 
+/// Ends those who drive a board without a cover, as `abs_hil safe` does. They are asked first, but not for long.
+/// Returns what it did, a sentence each.
+/// @param files  of the board @param holder  has a right to have it open: others are suspected first
+std::vector<std::string> end_unguarded(const std::vector<std::string>& files, pid_t holder);
+
 }  // namespace abs_hil::guardian

@@ -1,7 +1,9 @@
 // Sends and receives the packets between controller and service, with their descriptors.
 #include "guardian/lease_wire.hpp"
 
+#include <grp.h>
 #include <poll.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -105,6 +107,14 @@ int connect_to(const std::string& path, std::int64_t within_ns) {
     static_cast<void>(::poll(nullptr, 0, pause_ms));
   }
   return fd;
+}
+
+void open_for_group(const std::string& path) {
+  const group* const members = ::getgrnam("abs_hil");
+  if (members != nullptr) {
+    [[maybe_unused]] const int changed = ::chown(path.c_str(), static_cast<uid_t>(-1), members->gr_gid);
+  }
+  ::chmod(path.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP);
 }
 
 }  // namespace abs_hil::guardian

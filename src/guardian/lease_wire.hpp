@@ -56,5 +56,7 @@ using Peer = ::ucred;
 /// accepts nobody: once its queue is full, connect_to() fails with EAGAIN after `within_ns`.
 [[nodiscard]] int listen_at(const std::string& path);
 [[nodiscard]] int connect_to(const std::string& path, std::int64_t within_ns = 2 * rig::ns_per_s);
+/// Members of the group abs_hil may ask for leases, as they may open the boards.
+void open_for_group(const std::string& path);
 
 }  // namespace abs_hil::guardian

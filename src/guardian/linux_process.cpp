@@ -1,7 +1,9 @@
 // Calls of Linux: processes by their pidfds, packets with descriptors, texts in memory.
 #include "guardian/linux_process.hpp"
 
+#include <grp.h>
 #include <poll.h>
+#include <pwd.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -32,6 +34,24 @@ union FileSpace {
 int open_pidfd(pid_t process) noexcept {
   constexpr unsigned int no_flags = 0;  // a pidfd is always close-on-exec
   return static_cast<int>(::syscall(SYS_pidfd_open, process, no_flags));
+}
+
+bool become(uid_t user, gid_t group) {
+  if (::geteuid() == user) return true;
+  const passwd* const facts = ::getpwuid(user);
+  const bool groups = facts != nullptr ? ::initgroups(facts->pw_name, group) == 0 : ::setgroups(1, &group) == 0;
+  return groups && ::setresgid(group, group, group) == 0 && ::setresuid(user, user, user) == 0;
+}
+
+void close_all_but(std::vector<int> kept) noexcept {
+  std::ranges::sort(kept);
+  unsigned int from = STDERR_FILENO + 1;
+  for (const int fd : kept) {
+    if (fd < STDERR_FILENO + 1) continue;
+    if (static_cast<unsigned int>(fd) > from) ::close_range(from, static_cast<unsigned int>(fd) - 1, 0);
+    from = static_cast<unsigned int>(fd) + 1;
+  }
+  ::close_range(from, ~0U, 0);
 }
 
 int LinuxProcesses::open(pid_t pid) noexcept {

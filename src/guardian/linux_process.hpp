@@ -25,6 +25,10 @@ namespace abs_hil::guardian {
 [[nodiscard]] bool is_readable(int fd, int timeout_ms) noexcept;
 /// True once the process behind the pidfd has ended, `timeout_ms` later at the latest, and if there is no process.
 [[nodiscard]] inline bool has_ended(int pidfd, int timeout_ms = 0) noexcept { return is_readable(pidfd, timeout_ms); }
+/// Takes on the rights of this user for good.
+[[nodiscard]] bool become(uid_t user, gid_t group);
+/// Closes all descriptors behind stderr's but these.
+void close_all_but(std::vector<int> kept) noexcept;
 /// "process 17 (abs_hil)"
 [[nodiscard]] std::string name_of_process(pid_t pid);
 

@@ -1,11 +1,8 @@
 // `abs_guardian serve`: sets up the guard, its talker and its standby, and runs until it is ended.
 #include <fcntl.h>
-#include <grp.h>
-#include <pwd.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -64,15 +61,6 @@ config::Settings read_settings(const ServiceOptions& options) {
   return settings;
 }
 
-/// Members of the group abs_hil may ask for leases, as they may open the boards.
-void open_for_group(const std::string& path) {
-  const group* const members = ::getgrnam("abs_hil");
-  if (members != nullptr) {
-    [[maybe_unused]] const int changed = ::chown(path.c_str(), static_cast<uid_t>(-1), members->gr_gid);
-  }
-  ::chmod(path.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP);
-}
-
 /// Throws driver::Unavailable.
 driver::FileDescriptor open_listener(const std::string& path) {
   const auto refuse = [&path](const std::string& why) {
@@ -99,16 +87,6 @@ driver::FileDescriptor open_listener(const std::string& path) {
   return listener;
 }
 
-/// Takes on the rights of the client for good, so that it gets no file through the service that it could not write
-/// itself.
-bool become(const Peer& client) {
-  if (::geteuid() == client.uid) return true;
-  const passwd* const user = ::getpwuid(client.uid);
-  const bool groups = user != nullptr ? ::initgroups(user->pw_name, client.gid) == 0 : ::setgroups(1, &client.gid) == 0;
-  return groups && ::setresgid(client.gid, client.gid, client.gid) == 0 &&
-         ::setresuid(client.uid, client.uid, client.uid) == 0;
-}
-
 /// Runs `work` in a child process with the client's rights and without the service's descriptors: a slow disk does not
 /// hold up the talker.
 template <typename Work>
@@ -118,7 +96,7 @@ void in_child_of_client(const Peer& client, Work work) {
   if (child < 0) say(std::string("no flight record: ") + std::strerror(errno));
   if (child != 0) return;
   ::close_range(STDERR_FILENO + 1, ~0U, 0);
-  if (become(client)) {
+  if (become(client.uid, client.gid)) {  // gets no file through the service that it could not write itself
     work();
   } else {
     say(std::string("no flight record: cannot take on the rights of the client: ") + std::strerror(errno));
@@ -148,7 +126,7 @@ void be_quick() {
   if (::sched_getscheduler(0) == SCHED_OTHER) ::sched_setscheduler(0, SCHED_FIFO, &first);
 }
 
-/// A child process of the guard without the guard's descriptors, the board's among them. `work` never returns.
+/// A child process of the guard. `work` never returns.
 template <typename Work>
 pid_t start_companion(std::vector<int> keeps, Work work) {
   const pid_t guard = ::getpid();
@@ -156,14 +134,7 @@ pid_t start_companion(std::vector<int> keeps, Work work) {
   if (child != 0) return child;
   std::signal(SIGTERM, SIG_IGN);  // they end with the guard
   std::signal(SIGINT, SIG_IGN);
-  std::ranges::sort(keeps);
-  unsigned int from = STDERR_FILENO + 1;
-  for (const int fd : keeps) {
-    if (fd < STDERR_FILENO + 1) continue;
-    if (static_cast<unsigned int>(fd) > from) ::close_range(from, static_cast<unsigned int>(fd) - 1, 0);
-    from = static_cast<unsigned int>(fd) + 1;
-  }
-  ::close_range(from, ~0U, 0);
+  close_all_but(std::move(keeps));
   try {
     work(guard);
   } catch (const std::exception& error) {
@@ -227,7 +198,6 @@ class Service {
   static constexpr std::int64_t start_again_ns = 50'000'000;
   static constexpr std::int64_t alive_ns = 100'000'000;
   static constexpr std::int64_t tale_ns = 1'000'000'000;
-  static constexpr std::int64_t ends_within_ns = 20'000'000;
   /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
   static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
 
@@ -280,22 +250,13 @@ class Service {
     one.process = driver::FileDescriptor(one.pid > 0 ? open_pidfd(one.pid) : -1);
   }
 
-  /// Ends those who drive the board without a cover, as `abs_hil safe` does. They are asked first, but not for long.
   [[noreturn]] void hunt(bool tells) {
     constexpr sched_param below_guard{.sched_priority = 1};
     if (::sched_getscheduler(0) == SCHED_FIFO) ::sched_setscheduler(0, SCHED_FIFO, &below_guard);
-    std::vector<BoardOwner> owners = owners_of({files_of_board(settings_.driver)});
-    // The holder has a right to have the board open: others are suspected first.
     const pid_t holder = page_->holder.load(std::memory_order_relaxed);
-    if (owners.size() > 1) std::erase_if(owners, [holder](const BoardOwner& owner) { return owner.pid == holder; });
-    const auto must_go = [](auto, std::int64_t asked_ns) { return driver::monotonic_ns() > asked_ns + ends_within_ns; };
-    end_owners(owners, must_go);
-    if (!tells) ::_exit(exit_verified);
-    for (const BoardOwner& owner : owners) {
-      say("process " + std::to_string(owner.pid) + " (" + rig::clean_text(owner.name, 64) +
-          ") drove the board without being guarded, and " + (owner.ended ? "was ended" : "could not be ended"));
+    for (const std::string& done : end_unguarded(files_of_board(settings_.driver), holder)) {
+      if (tells) say(done);
     }
-    if (owners.empty()) say("something drives the board, and no process of this computer has it open");
     ::_exit(exit_verified);
   }
   [[noreturn]] void talk(pid_t guard) {

@@ -1,5 +1,5 @@
-// SHA-256 of a stream of bytes. The programs take OpenSSL's, which uses the processor's own instructions
-// (sha256_openssl.cpp); the simulation core needs no library for it (sha256_own.cpp). A program links one of the two.
+// SHA-256 of a stream of bytes. The simulation core has none: the programs take OpenSSL's (sha256_openssl.cpp), the
+// Python module hashlib's (python/src/sha256.cpp).
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// SHA-256 as FIPS 180-4 describes it, for the simulation core, which has no OpenSSL.
+// SHA-256 as FIPS 180-4 describes it: this test links the simulation core alone, which has none.
 #include <fmt/format.h>
 
 #include <algorithm>
