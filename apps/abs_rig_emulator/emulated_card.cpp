@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "control.hpp"
+#include "emulator/card_model.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::program {
@@ -48,7 +49,7 @@ std::vector<ServedFile> files_of(const EmulatorOptions& options) {
                                 {.name = "enable", .content = "1\n"},
                                 {.name = "resource", .content = none + none + bar2 + none + none + none + none},
                                 {.name = "resource2", .bytes = options.bar_bytes, .registers = true, .mode = 0600}};
-  if (options.lock_step) {
+  if (options.board.lock_step) {
     files.push_back({.name = time_file, .bytes = 8, .registers = true, .mode = 0600});
   }
   return files;
@@ -66,16 +67,38 @@ void wait_for(std::int64_t duration_ns) {
   clock.sleep_until(clock.now_ns() + duration_ns);
 }
 
+/// Unmounts `root` if an emulator that was killed left it mounted: every access to such a mount fails with ENOTCONN.
+void detach_dead_mount(const std::string& root) {
+  struct stat folder {};
+  if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;
+  if (umount2(root.c_str(), MNT_DETACH) == 0) return;
+  // Without root's rights only fuse3's helper may unmount.
+  std::array<char*, 4> words{const_cast<char*>("fusermount3"), const_cast<char*>("-uz"),
+                             const_cast<char*>(root.c_str()), nullptr};
+  pid_t helper{};
+  int status{-1};
+  if (posix_spawnp(&helper, words[0], nullptr, nullptr, words.data(), environ) == 0) waitpid(helper, &status, 0);
+  if (status != 0)
+    throw std::runtime_error("a killed emulator left a dead mount at " + root + ": run fusermount3 -uz " + root);
+}
+
+/// Creates the folder of the tree before anything else: the other files are often beside it, in the same new one.
+const EmulatorOptions& with_folder(const EmulatorOptions& options) {
+  detach_dead_mount(options.pci_root);
+  std::filesystem::create_directories(options.pci_root);
+  return options;
+}
+
 /// A folder with one folder per card, of which only the first has the card behind it; all have the same files. Text
 /// files are like those of sysfs. Every access to a file of registers goes to the card, uncached (direct_io), in the
 /// caller's thread. The answers to FUSE are -errno, or the number of bytes read or written.
-class EmulatedCard final : public EmulatedBoard {
+class EmulatedCard final : public BoardOf<EmulatedCard> {
  public:
-  /// Mounts the tree at `pci_root`, an empty folder.
+  /// Mounts the tree at `pci_root`, an empty folder that is created if it is missing.
   explicit EmulatedCard(const EmulatorOptions& options)
-      : model_(options.card),
+      : BoardOf(with_folder(options), true),
+        model_(options.board),
         faulty_(model_, options.seed),
-        time_(options.lock_step, options.truth_file, true),
         root_(options.pci_root),
         folders_(options.bdfs),
         files_(files_of(options)) {
@@ -96,11 +119,6 @@ class EmulatedCard final : public EmulatedBoard {
     if (got <= 0) return false;  // it has been unmounted from outside
     fuse_session_process_buf(session, &buffer_);
     return fuse_session_exited(session) == 0;
-  }
-  void catch_up() override { time_.catch_up(model_); }
-  std::string obey(std::string_view line) override {
-    catch_up();
-    return obey_line(*this, line);
   }
   [[nodiscard]] std::string status() const override {
     return fmt::format("{}, trip flags {:#x}", state_text(model_), model_.trip_flags());
@@ -226,9 +244,7 @@ class EmulatedCard final : public EmulatedBoard {
   emulator::FaultyCard faulty_;
   bool present_{true};
   bool permission_denied_{false};
-  BoardTime time_;
   OutputFile traffic_{};
-  OutputFile changes_{};
   std::pair<std::uint32_t, std::uint32_t> last_widths_{};
   std::string root_;
   std::vector<std::string> folders_;
@@ -306,21 +322,6 @@ fuse_operations operations() {
   return ops;
 }
 
-/// Unmounts `root` if an emulator that was killed left it mounted: every access to such a mount fails with ENOTCONN.
-void detach_dead_mount(const std::string& root) {
-  struct stat folder {};
-  if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;
-  if (umount2(root.c_str(), MNT_DETACH) == 0) return;
-  // Without root's rights only fuse3's helper may unmount.
-  std::array<char*, 4> words{const_cast<char*>("fusermount3"), const_cast<char*>("-uz"),
-                             const_cast<char*>(root.c_str()), nullptr};
-  pid_t helper{};
-  int status{-1};
-  if (posix_spawnp(&helper, words[0], nullptr, nullptr, words.data(), environ) == 0) waitpid(helper, &status, 0);
-  if (status != 0)
-    throw std::runtime_error("a killed emulator left a dead mount at " + root + ": run fusermount3 -uz " + root);
-}
-
 void EmulatedCard::mount() {
   std::array<char*, 4> words{const_cast<char*>("abs_rig_emulator"), const_cast<char*>("-o"),
                              const_cast<char*>("fsname=abs_rig_emulator"), nullptr};
@@ -337,13 +338,6 @@ void EmulatedCard::mount() {
 
 }  // namespace
 
-std::string commands_of_card() { return help_of(EmulatedCard::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_card(const EmulatorOptions& options) {
-  // First: the other files are often beside the folder, in the same new one.
-  detach_dead_mount(options.pci_root);
-  std::filesystem::create_directories(options.pci_root);
-  return std::make_unique<EmulatedCard>(options);
-}
+BoardKind card_kind() { return kind_of<EmulatedCard>("a card"); }
 
 }  // namespace abs_hil::program

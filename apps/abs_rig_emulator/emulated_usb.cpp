@@ -39,24 +39,17 @@ int free_port(const std::string& controller) {
   throw std::runtime_error(controller + ": all high-speed ports are in use; detach a device (usbip detach)");
 }
 
-emulator::UsbBoardOptions board_options(const EmulatorOptions& options) {
-  emulator::UsbBoardOptions board = options.usb;
-  board.plant = options.card.plant;
-  board.start_speed_rad_s = options.card.start_speed_rad_s;
-  return board;
-}
-
 /// The board, plugged into this computer's virtual USB host controller (vhci_hcd) through a socket pair.
-class EmulatedUsb final : public EmulatedBoard {
+class EmulatedUsb final : public BoardOf<EmulatedUsb> {
  public:
   /// Plugs the board in.
   explicit EmulatedUsb(const EmulatorOptions& options)
-      : options_(options),
-        board_(board_options(options)),
+      : BoardOf(options),
+        options_(options),
+        board_(options.board),
         device_(board_, options.identity, options.seed,
-                options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
-                                  : emulator::UsbipDevice::GoOnTo()),
-        time_(options.lock_step, options.truth_file) {
+                options.board.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t now) { go_on_to(now); })
+                                        : emulator::UsbipDevice::GoOnTo()) {
     for (const std::string& command : options.when_braking) {
       if (command == "plug")
         throw std::invalid_argument("--when-braking plug: the board is already plugged in; give another");
@@ -78,12 +71,11 @@ class EmulatedUsb final : public EmulatedBoard {
     return true;
   }
   void catch_up() override {
-    if (!options_.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
+    if (!options_.board.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
     std::vector<std::uint8_t> replies;
     device_.give_answers(driver::monotonic_ns(), replies);
     send(replies);
   }
-  std::string obey(std::string_view line) override { return obey_line(*this, line); }
   [[nodiscard]] std::string status() const override {
     return fmt::format("{}, frames {}, nonsense {}, JTAG {}", state_text(board_), board_.frames_taken(),
                        board_.nonsense(), device_.jtag_transfers());
@@ -177,15 +169,10 @@ class EmulatedUsb final : public EmulatedBoard {
   emulator::UsbipDevice device_;
   driver::FileDescriptor host_{-1};
   std::int64_t brake_since_ns_{-1};
-  BoardTime time_;
 };
 
 }  // namespace
 
-std::string commands_of_usb() { return help_of(EmulatedUsb::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_usb(const EmulatorOptions& options) {
-  return std::make_unique<EmulatedUsb>(options);
-}
+BoardKind usb_kind() { return kind_of<EmulatedUsb>("a USB board"); }
 
 }  // namespace abs_hil::program

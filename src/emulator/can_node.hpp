@@ -53,30 +53,16 @@ struct BusFrame {
   }
 };
 
-/// Properties of the emulated node. This project chose limits and supply, as for the emulated card.
-struct CanNodeOptions {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::uint16_t watchdog_ms{20};  ///< until an activation sets another value
-  bool lock_step{false};          ///< only ABS_TIME advances the time
-  bool can_fd{true};              ///< answers a SYNC in an FD frame with an FD frame
-  double supply_V{24.0};
-  double supply_min_V{15.0};
-  double temperature_C{30.0};
-  double temperature_max_C{90.0};
-  double overspeed_rpm{2200.0};
-};
-
 /// The CAN I/O node of docs/can.md with the simulated rig behind it. It latches its counters at a SYNC, applies
-/// commands, and zeroes its outputs when valid commands stop. It was written only from config/can/abs_rig.dbc and
+/// commands, and zeroes its outputs when valid commands stop. In lock-step ABS_TIME advances its time. It was written only from config/can/abs_rig.dbc and
 /// shares no code with the driver.
 class CanNode final : public RigBehind {
  public:
   enum class State : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit CanNode(const CanNodeOptions& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit CanNode(const BoardOptions& options) : RigBehind(options) {
+    log_ = OutputLog("last valid command");
     if (options.watchdog_ms < 1 || options.watchdog_ms > 10000) {
       throw std::invalid_argument("watchdog " + std::to_string(options.watchdog_ms) + " ms: give 1 to 10000");
     }
@@ -94,12 +80,6 @@ class CanNode final : public RigBehind {
   }
   /// The frames that it has sent since the last call, in order.
   [[nodiscard]] std::vector<BusFrame> take_answers() { return std::exchange(answers_, {}); }
-  [[nodiscard]] OutputLog& log() noexcept { return log_; }
-
-  // Events from outside the rig.
-  void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
-  void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
-  void trip_overspeed() noexcept { overspeed_latched_ = true; }
   /// Fault of the power stage: from now on the brake's duty differs by `error` from the command.
   void break_brake_output(double error) noexcept { brake_error_ = error; }
 
@@ -225,7 +205,7 @@ class CanNode final : public RigBehind {
       note_outputs("interlock");
     }
   }
-  void note_outputs(const std::string& why) { log_.note(time_ns(), outputs(), why, last_command_ns_); }
+  [[nodiscard]] std::int64_t last_reload_ns() const noexcept override { return last_command_ns_; }
   [[nodiscard]] std::uint8_t trips_and_state() const noexcept {
     return static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
   }
@@ -306,7 +286,6 @@ class CanNode final : public RigBehind {
     check_interlocks();
   }
 
-  CanNodeOptions options_;
   State state_{State::inactive};
   std::uint8_t latch_reason_{0};
   double brake_{0.0};
@@ -327,7 +306,6 @@ class CanNode final : public RigBehind {
   bool host_time_known_{false};
   std::uint64_t host_time_{0};
   std::vector<BusFrame> answers_{};
-  OutputLog log_{"last valid command"};
 };
 
 /// Applies a fault between a node and its bus. The names are those of the control command `fault NAME[=NUMBER]`.

@@ -20,24 +20,6 @@
 
 namespace abs_hil::emulator {
 
-/// Properties of the emulated card and limits of its FPGA. Where the maker's sources give no value, this project chose
-/// the default ("our choice"). Where they are silent or disagree, an option selects the variant, so that tests cover
-/// both.
-struct CardOptions {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};                 ///< both wheels' speed at power-on, >= 0
-  std::uint32_t bitstream_version{0xAB5};        ///< our choice: the real word is not public
-  std::uint32_t channel_counts{0x3200};          ///< 3 counters (15:12), 2 timers (11:8); our choice
-  double supply_V{24.0};                         ///< our choice; 0 = no supply
-  double supply_min_V{15.0};                     ///< our choice
-  double temperature_C{30.0};                    ///< our choice
-  std::uint32_t temperature_max_C{90};           ///< our choice
-  double overspeed_rpm{2200.0};                  ///< our choice; in the vendor's demo the lower wheel reaches 1700
-  std::uint32_t velocity_period_ticks{400'000};  ///< ticks of 40 MHz; our choice: 10 ms
-  std::uint32_t overspeed_bit{0};                ///< bit 0 or 2 of the trip flags; temperature has the other one
-  bool trip_clears_width{false};                 ///< a trip zeroes the width registers as well as the outputs
-};
-
 /// Both PWMs' width registers and the times of their changes; card's clock, 0 at power-on.
 struct PwmWidths {
   std::uint32_t drive{0};
@@ -54,12 +36,11 @@ class CardModel final : public RigBehind {
   static constexpr std::uint32_t bytes = 256;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit CardModel(const CardOptions& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit CardModel(const BoardOptions& options) : RigBehind(options) {
     if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
       throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
     }
-    plain_[0x50 / 4] = options.velocity_period_ticks;
+    plain_[0x50 / 4] = 400'000;  // ticks of 40 MHz, 10 ms: our choice
     plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
     plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
     plain_[0xA8 / 4] = options.temperature_max_C;
@@ -70,7 +51,7 @@ class CardModel final : public RigBehind {
     const plant_sim::PlantState& s = plant().state();
     switch (offset) {
       case 0x00: return options_.bitstream_version;
-      case 0x04: return options_.channel_counts;
+      case 0x04: return 0x3200;  // 3 counters (15:12), 2 timers (11:8): our choice
       case 0x38: return supply_raw(options_.supply_V);
       case 0x54: return velocity(s.omega2_rad_s);
       case 0x58: return velocity(s.omega1_rad_s);
@@ -108,11 +89,8 @@ class CardModel final : public RigBehind {
     }
   }
 
-  // Events from outside the rig, except those of the host.
-  void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
-  void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
-  void trip_overspeed() noexcept {
-    overspeed_latched_ = true;
+  void trip_overspeed() noexcept override {
+    RigBehind::trip_overspeed();
     enforce_limits();
   }
 
@@ -203,7 +181,6 @@ class CardModel final : public RigBehind {
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { enforce_limits(); }
 
-  CardOptions options_;
   std::uint32_t pwm_index_{0};
   std::array<PwmChannel, pwm_count> pwm_{};
   PwmWidths widths_{};

@@ -46,7 +46,7 @@ constexpr std::uint32_t flash_id = 0x14;
 
 class Hm2Board final : public Hm2Fpga {
  public:
-  explicit Hm2Board(const Hm2Options& options) : Hm2Fpga(options) { start(); }
+  explicit Hm2Board(const BoardOptions& options) : Hm2Fpga(options) { start(); }
 
   [[nodiscard]] std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) override {
     bump(control, rx_packets);
@@ -216,6 +216,6 @@ class Hm2Board final : public Hm2Fpga {
 
 }  // namespace
 
-std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options) { return std::make_unique<Hm2Board>(options); }
+std::unique_ptr<UdpBoard> hm2_board(const BoardOptions& options) { return std::make_unique<Hm2Board>(options); }
 
 }  // namespace abs_hil::emulator

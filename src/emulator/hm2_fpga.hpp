@@ -28,9 +28,9 @@ class Hm2Fpga : public UdpBoard {
   static constexpr std::uint32_t clock_high_Hz = 200'000'000;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit Hm2Fpga(const Hm2Options& options) : UdpBoard(options), identity_(options.words) {
-    if (options.enable_pin < -1 || options.enable_pin >= static_cast<std::int32_t>(port_count * pins_per_port)) {
-      throw std::invalid_argument("enable pin " + std::to_string(options.enable_pin) + ": give -1 to 33");
+  explicit Hm2Fpga(const BoardOptions& options) : UdpBoard(options), identity_(options.words) {
+    if (options.enable_line < -1 || options.enable_line >= static_cast<std::int32_t>(port_count * pins_per_port)) {
+      throw std::invalid_argument("enable pin " + std::to_string(options.enable_line) + ": give -1 to 33");
     }
   }
 
@@ -101,7 +101,7 @@ class Hm2Fpga : public UdpBoard {
     const auto acting = [this](std::uint32_t io) {
       return options_.active_high_stage ? high_share(io) : 1.0 - high_share(io);
     };
-    const bool enabled = options_.enable_pin < 0 || acting(static_cast<std::uint32_t>(options_.enable_pin)) > 0.5;
+    const bool enabled = options_.enable_line < 0 || acting(static_cast<std::uint32_t>(options_.enable_line)) > 0.5;
     return {.drive_duty = emergency_stop() || !enabled ? 0.0 : acting(1), .brake_duty = acting(pins_per_port + 1)};
   }
   [[nodiscard]] bool bitten() const noexcept override { return status_ != 0; }
@@ -340,7 +340,7 @@ class Hm2Fpga : public UdpBoard {
     }
     c.last_ns = from_ns + static_cast<std::int64_t>(after * static_cast<double>(to_ns - from_ns));
   }
-  void note_outputs(const std::string& why) override { log_.note(time_ns(), outputs(), why, last_pet_ns_); }
+  [[nodiscard]] std::int64_t last_reload_ns() const noexcept override { return last_pet_ns_; }
 
   std::array<Port, port_count> ports_{};
   std::array<Generator, 2> generators_{};

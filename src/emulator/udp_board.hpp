@@ -12,27 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "abs_hil/plant_sim/options.hpp"
 #include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
-
-/// Words of a board's description by their addresses.
-using Hm2Words = std::vector<std::pair<std::uint16_t, std::uint32_t>>;
-
-/// Properties of the emulated Mesa 7I92T and of its wiring to the rig.
-struct Hm2Options {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::string name{"7I92T"};      ///< 1 to 16 characters
-  std::array<std::uint8_t, 6> mac{0x00, 0x60, 0x1B, 0x16, 0xAB, 0x50};
-  std::array<std::uint8_t, 4> address{192, 168, 1, 121};  ///< as EEPROM and mesaflash show it
-  std::int32_t enable_pin{-1};    ///< I/O that enables the drive with the stage's active level, 0 ... 33; -1: none
-  bool active_high_stage{false};  ///< the power stages act while their pins are high: full PWM after a bite
-  bool lock_step{false};          ///< only a write to space 5 advances the time
-  Hm2Words words{};               ///< in place of those of its description: another firmware, or an impossible one
-};
 
 /// The part of a HostMot2's registers that never changes: cookie, IDROM, module and pin descriptors of the firmware
 /// G540x2 on a 7I92.
@@ -52,8 +35,7 @@ struct Hm2Identity {
 class UdpBoard : public RigBehind {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit UdpBoard(const Hm2Options& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit UdpBoard(const BoardOptions& options) : RigBehind(options) {
     if (!options.name.empty() && options.name.size() <= 16) return;
     throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
   }
@@ -76,16 +58,10 @@ class UdpBoard : public RigBehind {
   [[nodiscard]] virtual bool drives_pins() const noexcept = 0;
   /// Datagrams with a command that writes something that acts: activations, commands, zeros.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
-  [[nodiscard]] OutputLog& log() noexcept { return log_; }
   /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
   [[nodiscard]] virtual std::string registers_text() const = 0;
 
  protected:
-  /// Notes the duties in the log if they have changed.
-  virtual void note_outputs(const std::string& why) = 0;
-
-  Hm2Options options_;
-  OutputLog log_{};
   std::uint64_t writes_{0};
 };
 
@@ -99,12 +75,12 @@ inline constexpr std::size_t largest_hm2_answer = 1472;
 /// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
 /// advances the time by a write of all 8 bytes.
 /// Throws std::invalid_argument if an option is outside its range.
-[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options);
+[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const BoardOptions& options);
 
 /// The node of docs/node.md: the core of its firmware, and the simulated rig behind its pins. Takes plant, start speed,
 /// MAC, address, lock-step and channels from `options`. A name that begins with "7I92" makes it present itself as that
 /// board. Throws std::invalid_argument as UdpBoard does.
-[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const Hm2Options& options);
+[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const BoardOptions& options);
 
 /// A datagram to or from a host. `peer` stands for the host's address.
 struct Hm2Datagram {
