@@ -202,11 +202,6 @@ enum class FaultKind : std::uint8_t {
   garbage,       ///< reads random values
 };
 
-struct Fault {
-  FaultKind kind{FaultKind::ok};
-  double parameter{0.0};
-};
-
 /// Result of one access for the host.
 struct AccessResult {
   bool failed{false};
@@ -219,21 +214,19 @@ class FaultyCard {
  public:
   FaultyCard(CardModel& card, std::uint64_t seed) : card_(card), random_(seed) {}
 
-  /// Begins or (`ok`) ends a fault of the register at `offset`.
-  void set(std::uint32_t offset, const Fault& fault) {
-    faults_.erase(offset);
-    if (fault.kind != FaultKind::ok) faults_[offset] = {.fault = fault, .stuck_at = card_.read32(offset)};
-  }
-  /// Sets a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid faults.
+  /// Begins or (`ok`) ends a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid
+  /// faults.
   void set(std::string_view text) {
-    const std::size_t colon = text.find(':');
-    const auto offset = colon == std::string_view::npos ? std::nullopt : offset_in(text.substr(0, colon));
-    const auto given = offset ? fault_in(text.substr(colon + 1), register_faults) : std::nullopt;
-    if (!given) {
-      refuse_fault(text, "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of " +
-                             usages_of(register_faults, ", "));
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const auto offset = offset_in(text.substr(0, colon));
+    const GivenFault given =
+        fault_in(offset ? text.substr(std::min(colon + 1, text.size())) : "", register_faults, text,
+                 "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of ", ", ");
+    faults_.erase(*offset);
+    const auto kind = static_cast<FaultKind>(given.place);
+    if (kind != FaultKind::ok) {
+      faults_[*offset] = {.kind = kind, .parameter = given.number, .stuck_at = card_.read32(*offset)};
     }
-    set(*offset, {.kind = static_cast<FaultKind>(given->place), .parameter = given->number});
   }
   void answer_all_ones(bool on) noexcept { all_ones_ = on; }
 
@@ -243,17 +236,17 @@ class FaultyCard {
     AccessResult result{.value = card_.read32(offset)};
     const auto found = faults_.find(offset);
     if (found == faults_.end()) return result;
-    State& state = found->second;
-    if (fails(state.fault)) return {.failed = true};
-    switch (state.fault.kind) {
-      case stuck: result.value = state.stuck_at; break;
-      case wrong: result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(state.fault.parameter)); break;
-      case slow: result.delay_ns = static_cast<std::int64_t>(state.fault.parameter * 1e3); break;
+    Fault& fault = found->second;
+    if (fails(fault)) return {.failed = true};
+    switch (fault.kind) {
+      case stuck: result.value = fault.stuck_at; break;
+      case wrong: result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(fault.parameter)); break;
+      case slow: result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3); break;
       case garbage: result.value = static_cast<std::uint32_t>(random_() >> 32U); break;
       case delayed:
-        state.earlier.push_back(result.value);
-        result.value = state.earlier.front();
-        if (static_cast<double>(state.earlier.size()) > state.fault.parameter) state.earlier.pop_front();
+        fault.earlier.push_back(result.value);
+        result.value = fault.earlier.front();
+        if (static_cast<double>(fault.earlier.size()) > fault.parameter) fault.earlier.pop_front();
         break;
       default: break;
     }
@@ -263,7 +256,7 @@ class FaultyCard {
     if (all_ones_) return {};  // the card is not on the bus: the write is lost
     AccessResult result;
     if (const auto found = faults_.find(offset); found != faults_.end()) {
-      const Fault& fault = found->second.fault;
+      const Fault& fault = found->second;
       if (fails(fault)) return {.failed = true};
       if (fault.kind == FaultKind::stuck) return {};
       if (fault.kind == FaultKind::slow) result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3);
@@ -289,8 +282,9 @@ class FaultyCard {
     return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
   }
 
-  struct State {
-    Fault fault{};
+  struct Fault {
+    FaultKind kind{FaultKind::ok};
+    double parameter{0.0};
     std::uint32_t stuck_at{0};
     std::deque<std::uint32_t> earlier{};
   };
@@ -302,7 +296,7 @@ class FaultyCard {
 
   CardModel& card_;
   std::mt19937_64 random_;
-  std::map<std::uint32_t, State> faults_{};
+  std::map<std::uint32_t, Fault> faults_{};
   bool all_ones_{false};
 };
 

@@ -107,9 +107,8 @@ class Hm2Link {
                                                       {"short=BYTES", 0, 1472},
                                                       {"garbage"}}};
     const auto given = fault_in(text, names);
-    if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
-    kind_ = static_cast<Kind>(given->place);
-    number_ = given->number;
+    kind_ = static_cast<Kind>(given.place);
+    number_ = given.number;
     kept_.reset();
   }
   /// Pulls or plugs the cable. What was under way is lost.
