@@ -47,9 +47,12 @@ class EmulatedUsb final : public BoardOf<EmulatedUsb> {
       : BoardOf(options),
         options_(options),
         board_(options.board),
-        device_(board_, options.identity, options.seed,
-                options.board.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t now) { go_on_to(now); })
-                                        : emulator::UsbipDevice::GoOnTo()) {
+        device_(
+            board_, options.identity, options.seed,
+            !options.board.lock_step ? emulator::UsbipDevice::GoOnTo() : [this](std::int64_t time_ns) {
+              time_.advance(board_, time_ns);
+              run_commands_when_braking();
+            }) {
     for (const std::string& command : options.when_braking) {
       if (command == "plug")
         throw std::invalid_argument("--when-braking plug: the board is already plugged in; give another");
@@ -71,7 +74,8 @@ class EmulatedUsb final : public BoardOf<EmulatedUsb> {
     return true;
   }
   void catch_up() override {
-    if (!options_.board.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
+    BoardOf::catch_up();
+    run_commands_when_braking();
     std::vector<std::uint8_t> replies;
     device_.give_answers(driver::monotonic_ns(), replies);
     send(replies);
@@ -145,10 +149,6 @@ class EmulatedUsb final : public BoardOf<EmulatedUsb> {
       if (part <= 0) unplug();
       sent += static_cast<std::size_t>(part > 0 ? part : 0);
     }
-  }
-  void go_on_to(std::int64_t time_ns) {
-    time_.advance(board_, time_ns);
-    run_commands_when_braking();
   }
   void run_commands_when_braking() {
     if (options_.when_braking.empty()) return;

@@ -58,7 +58,7 @@ class CardModel final : public RigBehind {
       case 0x60: return pwm_index_;
       case 0x64:
       case 0x68:
-      case 0x6C: return read_pwm(offset);
+      case 0x6C: return pwm_index_ < pwm_count ? pwm_[pwm_index_][(offset - 0x64) / 4] : 0;
       case 0x80: return encoder_index_;
       case 0x84: return reset_mask_;
       case 0x88:
@@ -97,8 +97,8 @@ class CardModel final : public RigBehind {
   [[nodiscard]] Outputs outputs() const noexcept override {
     if (trip_flags() != 0) return {};
     const auto duty = [](const PwmChannel& channel) {
-      const std::uint32_t full = channel.mode == 1 ? 4095 : 255;
-      return static_cast<double>(std::min(channel.width, full)) / static_cast<double>(full);
+      const std::uint32_t full = channel[mode] == 1 ? 4095 : 255;
+      return static_cast<double>(std::min(channel[width], full)) / static_cast<double>(full);
     };
     return {.drive_duty = emergency_stop() ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
   }
@@ -131,38 +131,25 @@ class CardModel final : public RigBehind {
 
   static std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(supply_scale_V / volts) : 0; }
 
-  struct PwmChannel {
-    std::uint32_t mode{1};
-    std::uint32_t prescaler{60};
-    std::uint32_t width{0};
-  };
+  enum PwmRegister : std::uint32_t { mode, prescaler, width };  // from offset 64
+  using PwmChannel = std::array<std::uint32_t, 3>;
   static constexpr std::uint32_t pwm_count = 2;
   static constexpr std::uint32_t encoder_count = 3;
 
   void note_widths(std::int64_t written_ns) noexcept {
     const bool were_zero = widths_.drive == 0 && widths_.brake == 0;
-    widths_.drive = pwm_[0].width;
-    widths_.brake = pwm_[1].width;
+    widths_.drive = pwm_[0][width];
+    widths_.brake = pwm_[1][width];
     widths_.last_written_ns = written_ns;
     if (!were_zero) widths_.zero_since_ns = time_ns();
   }
-  [[nodiscard]] std::uint32_t read_pwm(std::uint32_t offset) const noexcept {
-    if (pwm_index_ >= pwm_count) return 0;
-    const PwmChannel& channel = pwm_[pwm_index_];
-    if (offset == 0x64) return channel.mode;
-    return offset == 0x68 ? channel.prescaler : channel.width;
-  }
   void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
     if (pwm_index_ >= pwm_count) return;
-    PwmChannel& channel = pwm_[pwm_index_];
-    if (offset == 0x64) {
-      channel.mode = value & 1U;
-    } else if (offset == 0x68) {
-      channel.prescaler = value & 0xFFFFU;
-    } else if (!options_.trip_clears_width || trip_flags() == 0) {
-      channel.width = value & 0xFFFU;
-    }
-    if (offset == 0x6C) note_widths(time_ns());
+    constexpr std::array<std::uint32_t, 3> bits{1, 0xFFFF, 0xFFF};
+    const std::uint32_t which = (offset - 0x64) / 4;
+    const bool locked = which == width && options_.trip_clears_width && trip_flags() != 0;
+    if (!locked) pwm_[pwm_index_][which] = value & bits[which];
+    if (which == width) note_widths(time_ns());
   }
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept {
     // 0 is the lower wheel, 1 the upper wheel, 2 the lever, which is at rest.
@@ -175,31 +162,19 @@ class CardModel final : public RigBehind {
   void enforce_limits() noexcept {
     latch_overspeed(velocity(fastest_rad_s()) > plain_[0x5C / 4]);
     if (options_.trip_clears_width && trip_flags() != 0) {
-      for (PwmChannel& channel : pwm_) channel.width = 0;
+      for (PwmChannel& channel : pwm_) channel[width] = 0;
       note_widths(widths_.last_written_ns);
     }
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { enforce_limits(); }
 
   std::uint32_t pwm_index_{0};
-  std::array<PwmChannel, pwm_count> pwm_{};
+  std::array<PwmChannel, pwm_count> pwm_{{{1, 60, 0}, {1, 60, 0}}};
   PwmWidths widths_{};
   std::uint32_t encoder_index_{0};
   std::uint32_t reset_mask_{0};
   std::array<std::uint32_t, encoder_count> zero_{};  ///< raw count at which each counter shows 0
   std::array<std::uint32_t, bytes / 4> plain_{};     ///< registers that only store the written value
-};
-
-/// Faults of one register. The names are those of `--fault OFFSET:NAME[=PARAMETER]`.
-enum class FaultKind : std::uint8_t {
-  ok,            ///< no fault: heals the register
-  stuck,         ///< keeps the value that it had when the fault began; writes are lost
-  wrong,         ///< reads its value plus the parameter
-  slow,          ///< each access takes the parameter in us
-  delayed,       ///< reads the value of n reads ago (n: parameter)
-  intermittent,  ///< each access fails with the given probability
-  off,           ///< every access fails
-  garbage,       ///< reads random values
 };
 
 /// Result of one access for the host.
@@ -218,37 +193,32 @@ class FaultyCard {
   /// faults.
   void set(std::string_view text) {
     const std::size_t colon = std::min(text.find(':'), text.size());
-    const auto offset = offset_in(text.substr(0, colon));
+    const std::uint32_t offset = offset_in(text.substr(0, colon));
+    const bool known = offset < CardModel::bytes;
     const GivenFault given =
-        fault_in(offset ? text.substr(std::min(colon + 1, text.size())) : "", register_faults, text,
+        fault_in(known ? text.substr(std::min(colon + 1, text.size())) : "", register_faults, text,
                  "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of ", ", ");
-    faults_.erase(*offset);
-    const auto kind = static_cast<FaultKind>(given.place);
-    if (kind != FaultKind::ok) {
-      faults_[*offset] = {.kind = kind, .parameter = given.number, .stuck_at = card_.read32(*offset)};
-    }
+    const std::string_view kind = register_faults[given.place].name();
+    faults_.erase(offset);
+    if (kind != "ok") faults_[offset] = {.kind = kind, .parameter = given.number, .stuck_at = card_.read32(offset)};
   }
   void answer_all_ones(bool on) noexcept { all_ones_ = on; }
 
   AccessResult read32(std::uint32_t offset) {
-    using enum FaultKind;
     if (all_ones_) return {.value = ~0U};
     AccessResult result{.value = card_.read32(offset)};
     const auto found = faults_.find(offset);
     if (found == faults_.end()) return result;
     Fault& fault = found->second;
     if (fails(fault)) return {.failed = true};
-    switch (fault.kind) {
-      case stuck: result.value = fault.stuck_at; break;
-      case wrong: result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(fault.parameter)); break;
-      case slow: result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3); break;
-      case garbage: result.value = static_cast<std::uint32_t>(random_() >> 32U); break;
-      case delayed:
-        fault.earlier.push_back(result.value);
-        result.value = fault.earlier.front();
-        if (static_cast<double>(fault.earlier.size()) > fault.parameter) fault.earlier.pop_front();
-        break;
-      default: break;
+    result.delay_ns = fault.delay_ns();
+    if (fault.kind == "stuck") result.value = fault.stuck_at;
+    if (fault.kind == "wrong") result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(fault.parameter));
+    if (fault.kind == "garbage") result.value = static_cast<std::uint32_t>(random_() >> 32U);
+    if (fault.kind == "delayed") {
+      fault.earlier.push_back(result.value);
+      result.value = fault.earlier.front();
+      if (static_cast<double>(fault.earlier.size()) > fault.parameter) fault.earlier.pop_front();
     }
     return result;
   }
@@ -258,40 +228,45 @@ class FaultyCard {
     if (const auto found = faults_.find(offset); found != faults_.end()) {
       const Fault& fault = found->second;
       if (fails(fault)) return {.failed = true};
-      if (fault.kind == FaultKind::stuck) return {};
-      if (fault.kind == FaultKind::slow) result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3);
+      if (fault.kind == "stuck") return {};
+      result.delay_ns = fault.delay_ns();
     }
     card_.write32(offset, value);
     return result;
   }
 
  private:
-  // In the order of FaultKind.
-  static constexpr std::array<FaultName, 8> register_faults{{{"ok"},
-                                                             {"stuck"},
-                                                             {"wrong=ADDEND", -2147483648.0, 2147483648.0},
-                                                             {"slow=US", 0.0, 10e6},
-                                                             {"delayed=READS", 1.0, 1e5},
-                                                             {"intermittent=PROBABILITY", 0.0, 1.0},
-                                                             {"off"},
-                                                             {"garbage"}}};
+  static constexpr std::array<FaultName, 8> register_faults{{
+      {"ok"},     // no fault: heals the register
+      {"stuck"},  // keeps the value that it had when the fault began; writes are lost
+      {"wrong=ADDEND", -2147483648.0, 2147483648.0},  // reads its value plus this
+      {"slow=US", 0.0, 10e6},                         // each access takes so long
+      {"delayed=READS", 1.0, 1e5},                    // reads the value of so many reads ago
+      {"intermittent=PROBABILITY", 0.0, 1.0},         // each access fails with it
+      {"off"},                                        // every access fails
+      {"garbage"},                                    // reads random values
+  }};
 
-  static std::optional<std::uint32_t> offset_in(std::string_view digits) {
+  /// CardModel::bytes if the text is no register's offset.
+  static std::uint32_t offset_in(std::string_view digits) {
     if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
-    const auto offset = rig::parse_number<std::uint32_t>(digits, 16);
-    return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
+    const std::uint32_t offset = rig::parse_number<std::uint32_t>(digits, 16).value_or(CardModel::bytes);
+    return offset % 4 == 0 ? std::min(offset, CardModel::bytes) : CardModel::bytes;
   }
 
   struct Fault {
-    FaultKind kind{FaultKind::ok};
+    std::string_view kind{};
     double parameter{0.0};
     std::uint32_t stuck_at{0};
     std::deque<std::uint32_t> earlier{};
+
+    [[nodiscard]] std::int64_t delay_ns() const {
+      return kind == "slow" ? static_cast<std::int64_t>(parameter * 1e3) : 0;
+    }
   };
   [[nodiscard]] bool fails(const Fault& fault) {
-    using enum FaultKind;
-    if (fault.kind == off) return true;
-    return fault.kind == intermittent && static_cast<double>(random_() >> 11U) * 0x1p-53 < fault.parameter;
+    if (fault.kind == "off") return true;
+    return fault.kind == "intermittent" && static_cast<double>(random_() >> 11U) * 0x1p-53 < fault.parameter;
   }
 
   CardModel& card_;

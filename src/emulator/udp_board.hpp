@@ -95,19 +95,20 @@ class Hm2Link {
 
   /// Sets a fault such as "loss=5". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text) {
-    // In the order of Kind.
-    static constexpr std::array<FaultName, 10> names{{{"ok"},
-                                                      {"loss=PERCENT", 0, 100},
-                                                      {"lose-requests=N", 0, 1e6},
-                                                      {"lose-answers=N", 0, 1e6},
-                                                      {"delay=US", 0, 1e7},
-                                                      {"reorder"},
-                                                      {"duplicate"},
-                                                      {"stale"},
-                                                      {"short=BYTES", 0, 1472},
-                                                      {"garbage"}}};
-    const auto given = fault_in(text, names);
-    kind_ = static_cast<Kind>(given.place);
+    static constexpr std::array<FaultName, 10> names{{
+        {"ok"},                       // heals all of them
+        {"loss=PERCENT", 0, 100},     // each datagram of both directions is lost with this probability
+        {"lose-requests=N", 0, 1e6},  // so many of the next ones are lost
+        {"lose-answers=N", 0, 1e6},
+        {"delay=US", 0, 1e7},      // every answer comes later
+        {"reorder"},               // answers leave in pairs, the later one first
+        {"duplicate"},             // every answer comes twice
+        {"stale"},                 // the answer before comes in place of each
+        {"short=BYTES", 0, 1472},  // answers end after so many bytes
+        {"garbage"},               // every answer is random bytes of its length
+    }};
+    const GivenFault given = fault_in(text, names);
+    fault_ = names[given.place].name();
     number_ = given.number;
     kept_.reset();
   }
@@ -120,37 +121,26 @@ class Hm2Link {
   [[nodiscard]] bool plugged() const noexcept { return plugged_; }
 
   /// True if the board receives the next request.
-  [[nodiscard]] bool request_arrives() { return !lost(Kind::lose_requests); }
+  [[nodiscard]] bool request_arrives() { return !lost("lose-requests"); }
   /// Takes the board's answer.
   void send(Hm2Datagram answer, std::int64_t now_ns) {
-    if (lost(Kind::lose_answers)) return;
+    if (lost("lose-answers")) return;
     const auto leave = [this, now_ns](Hm2Datagram datagram) {
-      const auto later_ns = kind_ == Kind::delay ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
+      const auto later_ns = fault_ == "delay" ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
       waiting_.push_back({now_ns + later_ns, std::move(datagram)});
     };
-    switch (kind_) {
-      case Kind::reorder:
-        if (!kept_) {
-          kept_ = std::move(answer);
-          return;
-        }
-        leave(std::move(answer));
-        leave(*std::exchange(kept_, std::nullopt));
-        return;
-      case Kind::stale:
-        if (kept_) std::swap(*kept_, answer);
-        if (!kept_) kept_ = answer;
-        break;
-      case Kind::duplicate: leave(answer); break;
-      case Kind::too_short:
-        answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_)));
-        break;
-      case Kind::garbage:
-        for (std::uint8_t& byte : answer.bytes) byte = static_cast<std::uint8_t>(random_());
-        break;
-      default: break;
+    if (fault_ == "reorder" && !kept_) {
+      kept_ = std::move(answer);
+      return;
     }
+    if (fault_ == "stale" && kept_) std::swap(*kept_, answer);
+    if (fault_ == "stale" && !kept_) kept_ = answer;
+    if (fault_ == "duplicate") leave(answer);
+    if (fault_ == "short") answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_)));
+    if (fault_ == "garbage")
+      std::ranges::generate(answer.bytes, [this] { return static_cast<std::uint8_t>(random_()); });
     leave(std::move(answer));
+    if (fault_ == "reorder") leave(*std::exchange(kept_, std::nullopt));
   }
   /// The answers that reach their hosts by now.
   [[nodiscard]] std::vector<Hm2Datagram> take_due(std::int64_t now_ns) {
@@ -169,32 +159,20 @@ class Hm2Link {
   }
 
  private:
-  enum class Kind : std::uint8_t {
-    ok,             ///< heals all of them
-    loss,           ///< each datagram of both directions is lost with this probability
-    lose_requests,  ///< the next ones are lost, as many as the number says
-    lose_answers,
-    delay,      ///< every answer comes later
-    reorder,    ///< answers leave in pairs, the later one first
-    duplicate,  ///< every answer comes twice
-    stale,      ///< the answer before comes in place of each
-    too_short,  ///< answers end after so many bytes
-    garbage,    ///< every answer is random bytes of its length
-  };
   struct Waiting {
     std::int64_t due_ns{0};
     Hm2Datagram answer{};
   };
-  [[nodiscard]] bool lost(Kind counted) {
+  [[nodiscard]] bool lost(std::string_view counted) {
     if (!plugged_) return true;
-    if (kind_ == Kind::loss) return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
-    if (kind_ != counted || number_ < 1.0) return false;
+    if (fault_ == "loss") return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
+    if (fault_ != counted || number_ < 1.0) return false;
     number_ -= 1.0;
     return true;
   }
 
   bool plugged_{true};
-  Kind kind_{Kind::ok};
+  std::string_view fault_{"ok"};
   double number_{0.0};
   std::optional<Hm2Datagram> kept_{};
   std::vector<Waiting> waiting_{};
