@@ -26,10 +26,6 @@ ControlCommand::ControlCommand(std::string_view text) : line(text) {
   for (std::string word; in >> word;) words.push_back(word);
 }
 
-bool ControlCommand::is(std::string_view name, std::size_t arguments) const {
-  return words.size() == arguments + 1 && words[0] == name;
-}
-
 double ControlCommand::number(std::size_t n) const {
   const auto value = rig::parse_number<double>(text(n));
   if (!value || !std::isfinite(*value)) throw std::invalid_argument("\"" + text(n) + "\" is not a finite number");
@@ -42,17 +38,13 @@ bool ControlCommand::first_of(std::size_t n, std::string_view first, std::string
   throw std::invalid_argument(fmt::format("\"{}\": give {} or {}", word, first, second));
 }
 
-void ControlCommand::refuse(const std::string& known) const {
-  throw std::invalid_argument("unknown command \"" + line + "\"; known are\n" + known);
-}
-
-void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* changes) {
+void take_log(emulator::OutputLog& log, std::int64_t start_ns, OutputFile& changes) {
   for (const emulator::BoardEvent& event : log.take_events()) {
     say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
   }
   for (const auto& [time_ns, now] : log.take_changes()) {
-    if (changes == nullptr) continue;
-    *changes << fmt::format("{} {:.6f} {:.6f}\n", start_ns + time_ns, now.drive_duty, now.brake_duty) << std::flush;
+    if (!changes.is_open()) continue;
+    changes << fmt::format("{} {:.6f} {:.6f}\n", start_ns + time_ns, now.drive_duty, now.brake_duty) << std::flush;
   }
 }
 
@@ -67,7 +59,7 @@ ControlFifo::ControlFifo(const std::string& path) {
     throw std::runtime_error(path + ": cannot open the FIFO: " + rig::refusal(errno, path, rig::writing));
 }
 
-void ControlFifo::take(const Obey& obey) {
+void ControlFifo::take(EmulatedBoard& board) {
   std::array<char, 512> buffer{};
   const ssize_t got = ::read(fifo_.get(), buffer.data(), buffer.size());
   if (got > 0) pending_.append(buffer.data(), static_cast<std::size_t>(got));
@@ -75,7 +67,7 @@ void ControlFifo::take(const Obey& obey) {
     const std::string line = pending_.substr(0, end);
     pending_.erase(0, end + 1);
     try {
-      say(line + ": " + obey(line));
+      say(line + ": " + board.obey(line));
     } catch (const std::exception& error) {
       say(line + ": error: " + error.what());
     }
@@ -98,10 +90,10 @@ void OutputFile::end() {
   clear();
 }
 
-BoardTime::BoardTime(bool lock_step, const std::string& truth_file, bool with_trip_flags) : lock_step_(lock_step) {
+BoardTime::BoardTime(const EmulatorOptions& options, bool with_trip_flags) : lock_step_(options.board.lock_step) {
   restart();
-  if (truth_file.empty()) return;
-  stream_.begin(truth_file);
+  if (options.truth_file.empty()) return;
+  stream_.begin(options.truth_file);
   stream_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty"
           << (with_trip_flags ? ",trip_flags\n" : "\n");
 }

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,24 +19,26 @@
 #include "cli/command_line.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
-#include "emulator/card_model.hpp"
-#include "emulator/udp_board.hpp"
+#include "emulator/rig_behind.hpp"
 #include "emulator/usbip_device.hpp"
 
 namespace abs_hil::program {
 
-/// What the command line says of the board.
+/// What the command line says.
 struct EmulatorOptions {
-  emulator::CardOptions card{};     ///< its plant, start speed and limits are those of every board
-  emulator::UsbBoardOptions usb{};  ///< its enable line is the 7I92T's, too
+  emulator::BoardOptions board{.name = ""};  ///< an empty name means the usual one
   emulator::UsbIdentity identity{};
-  emulator::Hm2Options hm2{};               ///< of the 7I92T or the node; an empty name means the usual one
-  std::uint16_t watchdog_ms{20};            ///< of the CAN node
   std::vector<std::string> when_braking{};  ///< commands of the USB board, obeyed once the brake has acted for 0.3 s
+  std::string plant{"paper-table1"};
+  std::vector<std::string> assignments{};
+  std::vector<std::string> faults{};
+  std::vector<std::string> commands{};
   std::uint64_t seed{1};
-  bool lock_step{false};
+  std::string control_fifo{};
   std::string truth_file{};    ///< CSV of true values that no register or frame shows; empty: none
   std::string traffic_file{};  ///< log of every register access to the card; empty: none
+  int cpu{-1};
+  int priority{81};
   // Where the board is.
   std::string pci_root{};
   std::string can_interface{};
@@ -75,20 +76,6 @@ class EmulatedBoard {
   [[nodiscard]] virtual std::string place() const = 0;
 };
 
-/// Each throws std::invalid_argument, or std::runtime_error if what it needs of this computer is missing: a FUSE mount,
-/// a bus or socket, a virtual host controller, an address.
-[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_card(const EmulatorOptions& options);
-[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_can_node(const EmulatorOptions& options);
-[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_usb(const EmulatorOptions& options);
-/// The 7I92T, or the node if `node_address` is not empty.
-[[nodiscard]] std::unique_ptr<EmulatedBoard> emulated_hm2(const EmulatorOptions& options);
-
-/// Their control commands, one per line, for the help.
-[[nodiscard]] std::string commands_of_card();
-[[nodiscard]] std::string commands_of_can_node();
-[[nodiscard]] std::string commands_of_usb();
-[[nodiscard]] std::string commands_of_hm2();
-
 /// Prints a line and flushes it.
 void say(const std::string& text);
 
@@ -99,8 +86,6 @@ struct ControlCommand {
   std::string line;
   std::vector<std::string> words{};
 
-  /// True if it has this name and number of arguments.
-  [[nodiscard]] bool is(std::string_view name, std::size_t arguments) const;
   /// The nth argument, from 1.
   [[nodiscard]] const std::string& text(std::size_t n) const { return words.at(n); }
   /// The nth argument as a finite number. Throws std::invalid_argument if it is not one.
@@ -109,9 +94,6 @@ struct ControlCommand {
   /// it is neither.
   [[nodiscard]] bool first_of(std::size_t n, std::string_view first, std::string_view second) const;
   [[nodiscard]] bool on(std::size_t n) const { return first_of(n, "on", "off"); }
-
-  /// Throws std::invalid_argument with the line and the known commands.
-  [[noreturn]] void refuse(const std::string& known) const;
 };
 
 /// A command that a board obeys. Its usage begins with its name, then come its arguments.
@@ -124,33 +106,10 @@ struct ControlRow {
   std::string (Board::*answer)() const {&Board::status};
 
   [[nodiscard]] bool is(const ControlCommand& command) const {
-    const auto arguments = static_cast<std::size_t>(std::count(usage.begin(), usage.end(), ' '));
-    const std::string_view name = usage.substr(0, usage.find(' '));
-    return any_arguments ? command.words.at(0) == name : command.is(name, arguments);
+    const auto words = static_cast<std::size_t>(std::ranges::count(usage, ' ')) + 1;
+    return command.words.at(0) == usage.substr(0, usage.find(' ')) && (any_arguments || command.words.size() == words);
   }
 };
-
-/// The commands of a board, one per line, for the help.
-template <class Board>
-[[nodiscard]] std::string help_of(std::span<const ControlRow<Board>> rows) {
-  std::string text;
-  for (const ControlRow<Board>& row : rows) text += fmt::format("{:<31} {}\n", row.usage, row.meaning);
-  return text + fmt::format("{:<31} {}\n", "status", "duties on the wire, speeds, and what the board tells");
-}
-
-/// Obeys one line and returns its answer. Throws std::invalid_argument for an unknown command.
-template <class Board>
-[[nodiscard]] std::string obey_line(Board& board, std::string_view line) {
-  const ControlCommand command(line);
-  if (command.words.empty()) return {};
-  if (command.is("status", 0)) return board.status();
-  for (const ControlRow<Board>& row : Board::rows()) {
-    if (!row.is(command)) continue;
-    if (row.obey != nullptr) row.obey(board, command);
-    return (board.*row.answer)();
-  }
-  command.refuse(help_of(Board::rows()));
-}
 
 /// Rows that several boards have. `model` of such a board is its emulator.
 template <class Board>
@@ -177,10 +136,6 @@ constexpr ControlRow<Board> turn_row{"turn upper|lower REVOLUTIONS", "a wheel is
                                        b.model().turn_by_hand(upper, c.number(2));
                                      }};
 
-/// Prints the events that a board has logged, and writes the changes of its outputs to an open file.
-/// @param start_ns  what the board's time begins at
-void take_log(emulator::OutputLog& log, std::int64_t start_ns, std::ostream* changes = nullptr);
-
 /// FIFO from which the emulator takes commands while it runs. An empty path means no FIFO.
 class ControlFifo {
  public:
@@ -189,9 +144,8 @@ class ControlFifo {
 
   /// Descriptor for poll(); -1: no FIFO.
   [[nodiscard]] int descriptor() const noexcept { return fifo_.get(); }
-  /// Obeys all complete lines received, and prints the answer or error of each.
-  using Obey = std::function<std::string(const std::string& line)>;
-  void take(const Obey& obey);
+  /// Lets the board obey all complete lines received, and prints the answer or error of each.
+  void take(EmulatedBoard& board);
 
  private:
   driver::FileDescriptor fifo_{};
@@ -217,9 +171,8 @@ class OutputFile : public std::ofstream {
 /// A board's time, and the CSV of true values that it does not show to the host, one row per ms of that time.
 class BoardTime {
  public:
-  /// `with_trip_flags`: adds a last column, for boards that have them. An empty file name writes nothing. Throws
-  /// std::runtime_error.
-  explicit BoardTime(bool lock_step, const std::string& truth_file = {}, bool with_trip_flags = false);
+  /// `with_trip_flags`: adds a last column, for boards that have them. Throws std::runtime_error.
+  explicit BoardTime(const EmulatorOptions& options, bool with_trip_flags = false);
 
   /// What the board's time begins at: 0 in lock-step, otherwise a time of this computer, ns.
   [[nodiscard]] std::int64_t start_ns() const noexcept { return started_ns_; }
@@ -262,7 +215,73 @@ class BoardTime {
   std::int64_t next_ns_{0};
 };
 
+/// Prints the events of a log, and writes the changes to a file if it is open.
+/// @param start_ns  what the board's time begins at
+void take_log(emulator::OutputLog& log, std::int64_t start_ns, OutputFile& changes);
+
 /// "time 1.234 s, drive 0.5000, brake 0.0000, upper 12.30 rad/s, lower 12.40 rad/s"
 [[nodiscard]] std::string state_text(const emulator::RigBehind& rig, int digits_of_time = 3);
+
+/// What every board does in the same way. `Board` has the rows() of its commands, and model(), its emulator.
+template <class Board>
+class BoardOf : public EmulatedBoard {
+ public:
+  explicit BoardOf(const EmulatorOptions& options, bool with_trip_flags = false) : time_(options, with_trip_flags) {}
+
+  void catch_up() override {
+    time_.catch_up(self().model());
+    log_events();
+  }
+  std::string obey(std::string_view line) override {
+    catch_up();
+    const ControlCommand command(line);
+    if (command.words.empty()) return {};
+    if (command.words == std::vector<std::string>{"status"}) return status();
+    for (const ControlRow<Board>& row : Board::rows()) {
+      if (!row.is(command)) continue;
+      if (row.obey != nullptr) row.obey(self(), command);
+      log_events();
+      return (self().*row.answer)();
+    }
+    throw std::invalid_argument("unknown command \"" + command.line + "\"; known are\n" + commands());
+  }
+  /// Its control commands, one per line, for the help.
+  [[nodiscard]] static std::string commands() {
+    std::string text;
+    const auto add = [&text](auto usage, auto meaning) { text += fmt::format("{:<31} {}\n", usage, meaning); };
+    for (const ControlRow<Board>& row : Board::rows()) add(row.usage, row.meaning);
+    add("status", "duties on the wire, speeds, and what the board tells");
+    return text;
+  }
+
+ protected:
+  /// Prints the events that the board has logged, and writes the changes of its outputs to an open file.
+  void log_events() { take_log(self().model().log(), time_.start_ns(), changes_); }
+
+  BoardTime time_;
+  OutputFile changes_{};
+
+ private:
+  [[nodiscard]] Board& self() noexcept { return static_cast<Board&>(*this); }
+};
+
+/// A kind of board. `make` throws std::invalid_argument, or std::runtime_error if what it needs of this computer is
+/// missing: a FUSE mount, a bus or socket, a virtual host controller, an address.
+struct BoardKind {
+  std::string_view name;
+  std::string commands;
+  std::unique_ptr<EmulatedBoard> (*make)(const EmulatorOptions& options);
+};
+template <class Board>
+[[nodiscard]] BoardKind kind_of(std::string_view name) {
+  return {name, Board::commands(), [](const EmulatorOptions& options) -> std::unique_ptr<EmulatedBoard> {
+            return std::make_unique<Board>(options);
+          }};
+}
+[[nodiscard]] BoardKind card_kind();
+[[nodiscard]] BoardKind can_node_kind();
+[[nodiscard]] BoardKind usb_kind();
+/// The 7I92T, or the node if `node_address` is not empty.
+[[nodiscard]] BoardKind hm2_kind();
 
 }  // namespace abs_hil::program

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "control.hpp"
+#include "emulator/card_model.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::program {
@@ -30,10 +31,10 @@ constexpr const char* time_file = "emulated_time_ns";
 /// One file of the tree below the card's folder.
 struct ServedFile {
   std::string name;
-  std::string content{};   ///< content of a read-only text file
-  std::uint64_t bytes{0};  ///< size of a file of registers
-  bool registers{false};   ///< reads and writes go to the card, one access each
-  mode_t mode{0444};
+  std::string content{};   ///< of a read-only text file
+  std::uint64_t bytes{0};  ///< size of a file of registers: reads and writes go to the card, one access each
+
+  [[nodiscard]] bool registers() const { return content.empty(); }
 };
 
 /// The files of sysfs that a driver reads.
@@ -47,10 +48,8 @@ std::vector<ServedFile> files_of(const EmulatorOptions& options) {
                                 {.name = "class", .content = "0x068000\n"},
                                 {.name = "enable", .content = "1\n"},
                                 {.name = "resource", .content = none + none + bar2 + none + none + none + none},
-                                {.name = "resource2", .bytes = options.bar_bytes, .registers = true, .mode = 0600}};
-  if (options.lock_step) {
-    files.push_back({.name = time_file, .bytes = 8, .registers = true, .mode = 0600});
-  }
+                                {.name = "resource2", .bytes = options.bar_bytes}};
+  if (options.board.lock_step) files.push_back({.name = time_file, .bytes = 8});
   return files;
 }
 
@@ -66,16 +65,38 @@ void wait_for(std::int64_t duration_ns) {
   clock.sleep_until(clock.now_ns() + duration_ns);
 }
 
+/// Unmounts `root` if an emulator that was killed left it mounted: every access to such a mount fails with ENOTCONN.
+void detach_dead_mount(const std::string& root) {
+  struct stat folder {};
+  if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;
+  if (umount2(root.c_str(), MNT_DETACH) == 0) return;
+  // Without root's rights only fuse3's helper may unmount.
+  std::array<char*, 4> words{const_cast<char*>("fusermount3"), const_cast<char*>("-uz"),
+                             const_cast<char*>(root.c_str()), nullptr};
+  pid_t helper{};
+  int status{-1};
+  if (posix_spawnp(&helper, words[0], nullptr, nullptr, words.data(), environ) == 0) waitpid(helper, &status, 0);
+  if (status != 0)
+    throw std::runtime_error("a killed emulator left a dead mount at " + root + ": run fusermount3 -uz " + root);
+}
+
+/// Creates the folder of the tree before anything else: the other files are often beside it, in the same new one.
+const EmulatorOptions& with_folder(const EmulatorOptions& options) {
+  detach_dead_mount(options.pci_root);
+  std::filesystem::create_directories(options.pci_root);
+  return options;
+}
+
 /// A folder with one folder per card, of which only the first has the card behind it; all have the same files. Text
 /// files are like those of sysfs. Every access to a file of registers goes to the card, uncached (direct_io), in the
 /// caller's thread. The answers to FUSE are -errno, or the number of bytes read or written.
-class EmulatedCard final : public EmulatedBoard {
+class EmulatedCard final : public BoardOf<EmulatedCard> {
  public:
-  /// Mounts the tree at `pci_root`, an empty folder.
+  /// Mounts the tree at `pci_root`, an empty folder that is created if it is missing.
   explicit EmulatedCard(const EmulatorOptions& options)
-      : model_(options.card),
+      : BoardOf(with_folder(options), true),
+        model_(options.board),
         faulty_(model_, options.seed),
-        time_(options.lock_step, options.truth_file, true),
         root_(options.pci_root),
         folders_(options.bdfs),
         files_(files_of(options)) {
@@ -96,11 +117,6 @@ class EmulatedCard final : public EmulatedBoard {
     if (got <= 0) return false;  // it has been unmounted from outside
     fuse_session_process_buf(session, &buffer_);
     return fuse_session_exited(session) == 0;
-  }
-  void catch_up() override { time_.catch_up(model_); }
-  std::string obey(std::string_view line) override {
-    catch_up();
-    return obey_line(*this, line);
   }
   [[nodiscard]] std::string status() const override {
     return fmt::format("{}, trip flags {:#x}", state_text(model_), model_.trip_flags());
@@ -149,53 +165,34 @@ class EmulatedCard final : public EmulatedBoard {
     if (file == files_.end()) return {};
     return {.exists = true, .behind = folder == folders_.begin(), .file = &*file};
   }
-  [[nodiscard]] std::vector<std::string> names_in(std::string_view path) const {
-    std::vector<std::string> names{".", ".."};
-    if (path != "/") {
-      for (const ServedFile& file : files_) names.push_back(file.name);
-      return names;
+  template <typename Use>
+  void for_each_name_in(std::string_view path, Use use) const {
+    if (path != "/") std::ranges::for_each(files_, use, &ServedFile::name);
+    for (auto folder = folders_.begin(); path == "/" && folder != folders_.end(); ++folder) {
+      if (is_there(folder)) use(*folder);
     }
-    for (auto folder = folders_.begin(); folder != folders_.end(); ++folder) {
-      if (is_there(folder)) names.push_back(*folder);
-    }
-    return names;
   }
   [[nodiscard]] int open() const { return permission_denied_ ? -EACCES : 0; }
-  [[nodiscard]] int read(std::string_view name, std::uint64_t offset, void* data, std::size_t size) {
-    if (name == time_file) {
-      const std::int64_t time_ns = model_.time_ns();
-      if (offset != 0 || size != sizeof time_ns) return -EINVAL;
-      std::memcpy(data, &time_ns, sizeof time_ns);
-      return sizeof time_ns;
+  /// One access of `size` bytes; `value` is what is written, or becomes what is read.
+  [[nodiscard]] int access(bool write, const ServedFile& file, off_t offset, std::size_t size, std::uint64_t& value) {
+    if (file.name == time_file) {
+      if (offset != 0 || size != sizeof value) return -EINVAL;
+      if (write) time_.advance(model_, static_cast<std::int64_t>(value));
+      value = static_cast<std::uint64_t>(model_.time_ns());
+      return sizeof value;
     }
     // The kernel splits other sizes into 1- and 2-byte port accesses, which the card does not have.
     if (size != sizeof(std::uint32_t) || offset % 4 != 0 || offset >= emulator::CardModel::bytes) return -EINVAL;
     catch_up();
-    const emulator::AccessResult result = faulty_.read32(static_cast<std::uint32_t>(offset));
+    const auto at = static_cast<std::uint32_t>(offset);
+    const emulator::AccessResult result =
+        write ? faulty_.write32(at, static_cast<std::uint32_t>(value)) : faulty_.read32(at);
     if (result.delay_ns > 0) wait_for(result.delay_ns);
     if (result.failed) return -EIO;
-    record('R', offset, result.value);
-    std::memcpy(data, &result.value, sizeof result.value);
-    return sizeof result.value;
-  }
-  [[nodiscard]] int write(std::string_view name, std::uint64_t offset, const void* data, std::size_t size) {
-    if (name == time_file) {
-      std::int64_t time_ns = 0;
-      if (offset != 0 || size != sizeof time_ns) return -EINVAL;
-      std::memcpy(&time_ns, data, sizeof time_ns);
-      time_.advance(model_, time_ns);
-      return sizeof time_ns;
-    }
-    if (size != sizeof(std::uint32_t) || offset % 4 != 0 || offset >= emulator::CardModel::bytes) return -EINVAL;
-    catch_up();
-    std::uint32_t value = 0;
-    std::memcpy(&value, data, sizeof value);
-    const emulator::AccessResult result = faulty_.write32(static_cast<std::uint32_t>(offset), value);
-    if (result.delay_ns > 0) wait_for(result.delay_ns);
-    if (result.failed) return -EIO;
-    record('W', offset, value);
-    if (changes_.is_open()) note_change();
-    return sizeof value;
+    if (!write) value = result.value;
+    if (traffic_.is_open()) traffic_ << fmt::format("{} {:02X} {:08x}\n", write ? 'W' : 'R', at, value);
+    if (write && changes_.is_open()) note_change();
+    return sizeof(std::uint32_t);
   }
 
  private:
@@ -203,9 +200,6 @@ class EmulatedCard final : public EmulatedBoard {
   /// False: the card is unplugged and its folder is gone.
   [[nodiscard]] bool is_there(std::vector<std::string>::const_iterator folder) const {
     return folder != folders_.begin() || present_;
-  }
-  void record(char direction, std::uint64_t offset, std::uint32_t value) {
-    if (traffic_.is_open()) traffic_ << fmt::format("{} {:02X} {:08x}\n", direction, offset, value);
   }
   void note_change() {
     const emulator::PwmWidths& w = model_.pwm_widths();
@@ -226,9 +220,7 @@ class EmulatedCard final : public EmulatedBoard {
   emulator::FaultyCard faulty_;
   bool present_{true};
   bool permission_denied_{false};
-  BoardTime time_;
   OutputFile traffic_{};
-  OutputFile changes_{};
   std::pair<std::uint32_t, std::uint32_t> last_widths_{};
   std::string root_;
   std::vector<std::string> folders_;
@@ -246,9 +238,9 @@ int on_getattr(const char* path, struct stat* out, fuse_file_info* /*info*/) {
   out->st_uid = getuid();
   out->st_gid = getgid();
   out->st_nlink = what.file == nullptr ? 2 : 1;
-  out->st_mode = what.file == nullptr ? S_IFDIR | 0755 : S_IFREG | what.file->mode;
+  out->st_mode = what.file == nullptr ? S_IFDIR | 0755 : S_IFREG | (what.file->registers() ? 0600 : 0444);
   if (what.file != nullptr) {
-    out->st_size = static_cast<off_t>(what.file->registers ? what.file->bytes : what.file->content.size());
+    out->st_size = static_cast<off_t>(what.file->registers() ? what.file->bytes : what.file->content.size());
   }
   return 0;
 }
@@ -256,7 +248,10 @@ int on_getattr(const char* path, struct stat* out, fuse_file_info* /*info*/) {
 int on_readdir(const char* path, void* buffer, fuse_fill_dir_t fill, off_t /*offset*/, fuse_file_info* /*info*/,
                fuse_readdir_flags /*flags*/) {
   if (!card().named(path).exists) return -ENOENT;
-  for (const std::string& name : card().names_in(path)) fill(buffer, name.c_str(), nullptr, 0, fuse_fill_dir_flags{});
+  const auto show = [&](const std::string& name) { fill(buffer, name.c_str(), nullptr, 0, fuse_fill_dir_flags{}); };
+  show(".");
+  show("..");
+  card().for_each_name_in(path, show);
   return 0;
 }
 
@@ -264,23 +259,29 @@ int on_open(const char* path, fuse_file_info* info) {
   const Named what = card().named(path);
   if (what.file == nullptr) return -ENOENT;
   info->direct_io = 1;
-  return what.file->registers ? card().open() : 0;
+  return what.file->registers() ? card().open() : 0;
 }
 
 int on_read(const char* path, char* data, size_t size, off_t offset, fuse_file_info* /*info*/) {
   const Named what = card().named(path);
   if (what.file == nullptr) return -ENODEV;  // the card was unplugged while the file was open
-  const auto at = static_cast<std::size_t>(offset);
-  if (what.file->registers) return what.behind ? card().read(what.file->name, at, data, size) : -EIO;
-  const std::string& content = what.file->content;
-  return static_cast<int>(content.copy(data, size, std::min(at, content.size())));
+  if (!what.file->registers()) {
+    const std::string& content = what.file->content;
+    return static_cast<int>(content.copy(data, size, std::min(static_cast<std::size_t>(offset), content.size())));
+  }
+  std::uint64_t value = 0;
+  const int done = what.behind ? card().access(false, *what.file, offset, size, value) : -EIO;
+  if (done > 0) std::memcpy(data, &value, static_cast<std::size_t>(done));
+  return done;
 }
 
 int on_write(const char* path, const char* data, size_t size, off_t offset, fuse_file_info* /*info*/) {
   const Named what = card().named(path);
   if (what.file == nullptr) return -ENODEV;
-  if (!what.file->registers || !what.behind) return -EACCES;
-  return card().write(what.file->name, static_cast<std::size_t>(offset), data, size);
+  if (!what.file->registers() || !what.behind) return -EACCES;
+  std::uint64_t value = 0;
+  std::memcpy(&value, data, std::min(size, sizeof value));
+  return card().access(true, *what.file, offset, size, value);
 }
 
 /// The kernel must cache nothing, so that an unplugged card disappears at once. Pipes make accesses of four bytes slow.
@@ -306,21 +307,6 @@ fuse_operations operations() {
   return ops;
 }
 
-/// Unmounts `root` if an emulator that was killed left it mounted: every access to such a mount fails with ENOTCONN.
-void detach_dead_mount(const std::string& root) {
-  struct stat folder {};
-  if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;
-  if (umount2(root.c_str(), MNT_DETACH) == 0) return;
-  // Without root's rights only fuse3's helper may unmount.
-  std::array<char*, 4> words{const_cast<char*>("fusermount3"), const_cast<char*>("-uz"),
-                             const_cast<char*>(root.c_str()), nullptr};
-  pid_t helper{};
-  int status{-1};
-  if (posix_spawnp(&helper, words[0], nullptr, nullptr, words.data(), environ) == 0) waitpid(helper, &status, 0);
-  if (status != 0)
-    throw std::runtime_error("a killed emulator left a dead mount at " + root + ": run fusermount3 -uz " + root);
-}
-
 void EmulatedCard::mount() {
   std::array<char*, 4> words{const_cast<char*>("abs_rig_emulator"), const_cast<char*>("-o"),
                              const_cast<char*>("fsname=abs_rig_emulator"), nullptr};
@@ -337,13 +323,6 @@ void EmulatedCard::mount() {
 
 }  // namespace
 
-std::string commands_of_card() { return help_of(EmulatedCard::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_card(const EmulatorOptions& options) {
-  // First: the other files are often beside the folder, in the same new one.
-  detach_dead_mount(options.pci_root);
-  std::filesystem::create_directories(options.pci_root);
-  return std::make_unique<EmulatedCard>(options);
-}
+BoardKind card_kind() { return kind_of<EmulatedCard>("a card"); }
 
 }  // namespace abs_hil::program

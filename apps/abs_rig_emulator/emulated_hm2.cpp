@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "control.hpp"
+#include "emulator/udp_board.hpp"
 #include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
@@ -65,16 +66,12 @@ std::array<std::uint8_t, 6> mac_in(const std::string& text) {
 
 bool is_node(const EmulatorOptions& options) { return !options.node_address.empty(); }
 
-emulator::Hm2Options board_options(const EmulatorOptions& options, const sockaddr_in& address) {
-  emulator::Hm2Options board = options.hm2;
-  board.plant = options.card.plant;
-  board.start_speed_rad_s = options.card.start_speed_rad_s;
-  board.enable_pin = options.usb.enable_line;
-  board.lock_step = options.lock_step;
+emulator::BoardOptions board_options(const EmulatorOptions& options, const sockaddr_in& address) {
+  emulator::BoardOptions board = options.board;
   if (board.name.empty()) board.name = is_node(options) ? "abs-node" : "7I92T";
   std::memcpy(board.address.data(), &address.sin_addr, board.address.size());
   if (!options.mac.empty()) board.mac = mac_in(options.mac);
-  if (is_node(options) && board.enable_pin > 0)
+  if (is_node(options) && board.enable_line > 0)
     throw std::invalid_argument("--enable-line: the node has output 0 alone");
   for (const std::string& text : options.wrong_words) {
     unsigned place = 0, value = 0;
@@ -92,16 +89,16 @@ emulator::Hm2Options board_options(const EmulatorOptions& options, const sockadd
 }
 
 /// The 7I92T or the node behind a UDP socket: time, cable, logs and the control commands.
-class EmulatedHm2 final : public EmulatedBoard {
+class EmulatedHm2 final : public BoardOf<EmulatedHm2> {
  public:
   explicit EmulatedHm2(const EmulatorOptions& options)
-      : is_node_(is_node(options)),
+      : BoardOf(options),
+        is_node_(is_node(options)),
         address_text_(is_node_ ? options.node_address : options.hm2_address),
         address_(address_in(address_text_)),
         options_(board_options(options, address_)),
         board_(is_node_ ? emulator::node_board(options_) : emulator::hm2_board(options_)),
-        link_(options.seed),
-        time_(options_.lock_step, options.truth_file) {
+        link_(options.seed) {
     if (socket_.get() < 0 ||
         ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address_), sizeof address_) != 0) {
       throw std::runtime_error(address_text_ + ": " + rig::refusal(errno, address_text_, rig::reaching));
@@ -136,12 +133,6 @@ class EmulatedHm2 final : public EmulatedBoard {
   [[nodiscard]] std::optional<std::int64_t> next_due_ns() const override {
     const std::optional<std::int64_t> due = link_.next_due_ns();
     return due ? std::optional(*due - driver::monotonic_ns()) : std::nullopt;
-  }
-  std::string obey(std::string_view line) override {
-    catch_up();
-    std::string answer = obey_line(*this, line);
-    log_events();
-    return answer;
   }
   [[nodiscard]] std::string status() const override {
     constexpr int microseconds = 6;
@@ -195,7 +186,6 @@ class EmulatedHm2 final : public EmulatedBoard {
                                  reinterpret_cast<const sockaddr*>(&to), sizeof to));
     }
   }
-  void log_events() { take_log(board_->log(), time_.start_ns(), changes_.is_open() ? &changes_ : nullptr); }
   void talk() {
     if (talker_.empty() || board_->time_ns() < talks_ns_) return;
     talks_ns_ = board_->time_ns() + talks_every_ns;
@@ -211,22 +201,16 @@ class EmulatedHm2 final : public EmulatedBoard {
   bool is_node_;
   std::string address_text_;
   sockaddr_in address_;
-  emulator::Hm2Options options_;
+  emulator::BoardOptions options_;
   std::unique_ptr<emulator::UdpBoard> board_;
   emulator::Hm2Link link_;
-  BoardTime time_;
   driver::FileDescriptor socket_{::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
-  OutputFile changes_{};
   std::span<const std::uint8_t> talker_{};
   std::int64_t talks_ns_{0};
 };
 
 }  // namespace
 
-std::string commands_of_hm2() { return help_of(EmulatedHm2::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_hm2(const EmulatorOptions& options) {
-  return std::make_unique<EmulatedHm2>(options);
-}
+BoardKind hm2_kind() { return kind_of<EmulatedHm2>("a 7I92T or a node"); }
 
 }  // namespace abs_hil::program

@@ -129,29 +129,21 @@ const char* name_of(emulator::CanNode::State state) {
 }
 
 /// The CAN I/O node on its bus.
-class EmulatedNode final : public EmulatedBoard {
+class EmulatedNode final : public BoardOf<EmulatedNode> {
  public:
   /// The bus decides about CAN FD.
   explicit EmulatedNode(const EmulatorOptions& options)
-      : interface_(options.can_interface),
+      : BoardOf(options),
+        interface_(options.can_interface),
         bus_(interface_),
-        options_{.plant = options.card.plant,
-                 .start_speed_rad_s = options.card.start_speed_rad_s,
-                 .watchdog_ms = options.watchdog_ms,
-                 .lock_step = options.lock_step,
-                 .can_fd = bus_.can_fd(),
-                 .supply_min_V = options.card.supply_min_V,
-                 .temperature_max_C = static_cast<double>(options.card.temperature_max_C),
-                 .overspeed_rpm = options.card.overspeed_rpm},
+        options_(options.board),
         node_(options_),
-        faults_(options.seed),
-        time_(options_.lock_step) {}
+        faults_(options.seed) {
+    options_.can_fd = bus_.can_fd();
+    power_on();
+  }
 
   [[nodiscard]] int descriptor() const override { return bus_.descriptor(); }
-  void catch_up() override {
-    time_.catch_up(node_);
-    take_log(node_.log(), time_.start_ns());
-  }
   bool serve() override {
     emulator::BusFrame frame;
     while (bus_.receive(frame)) {
@@ -160,12 +152,8 @@ class EmulatedNode final : public EmulatedBoard {
       node_.receive(frame);
       for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus_.send(answer);
     }
-    take_log(node_.log(), time_.start_ns());
+    log_events();
     return true;
-  }
-  std::string obey(std::string_view line) override {
-    catch_up();
-    return obey_line(*this, line);
   }
   [[nodiscard]] std::string status() const override {
     constexpr int microseconds = 6;
@@ -202,18 +190,13 @@ class EmulatedNode final : public EmulatedBoard {
 
   std::string interface_;
   BusSocket bus_;
-  emulator::CanNodeOptions options_;
+  emulator::BoardOptions options_;
   emulator::CanNode node_;
   emulator::NodeFaults faults_;
-  BoardTime time_;
 };
 
 }  // namespace
 
-std::string commands_of_can_node() { return help_of(EmulatedNode::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_can_node(const EmulatorOptions& options) {
-  return std::make_unique<EmulatedNode>(options);
-}
+BoardKind can_node_kind() { return kind_of<EmulatedNode>("a CAN node"); }
 
 }  // namespace abs_hil::program

@@ -39,24 +39,20 @@ int free_port(const std::string& controller) {
   throw std::runtime_error(controller + ": all high-speed ports are in use; detach a device (usbip detach)");
 }
 
-emulator::UsbBoardOptions board_options(const EmulatorOptions& options) {
-  emulator::UsbBoardOptions board = options.usb;
-  board.plant = options.card.plant;
-  board.start_speed_rad_s = options.card.start_speed_rad_s;
-  return board;
-}
-
 /// The board, plugged into this computer's virtual USB host controller (vhci_hcd) through a socket pair.
-class EmulatedUsb final : public EmulatedBoard {
+class EmulatedUsb final : public BoardOf<EmulatedUsb> {
  public:
   /// Plugs the board in.
   explicit EmulatedUsb(const EmulatorOptions& options)
-      : options_(options),
-        board_(board_options(options)),
-        device_(board_, options.identity, options.seed,
-                options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
-                                  : emulator::UsbipDevice::GoOnTo()),
-        time_(options.lock_step, options.truth_file) {
+      : BoardOf(options),
+        options_(options),
+        board_(options.board),
+        device_(
+            board_, options.identity, options.seed,
+            !options.board.lock_step ? emulator::UsbipDevice::GoOnTo() : [this](std::int64_t time_ns) {
+              time_.advance(board_, time_ns);
+              run_commands_when_braking();
+            }) {
     for (const std::string& command : options.when_braking) {
       if (command == "plug")
         throw std::invalid_argument("--when-braking plug: the board is already plugged in; give another");
@@ -78,12 +74,12 @@ class EmulatedUsb final : public EmulatedBoard {
     return true;
   }
   void catch_up() override {
-    if (!options_.lock_step) go_on_to(driver::monotonic_ns() - time_.start_ns());
+    BoardOf::catch_up();
+    run_commands_when_braking();
     std::vector<std::uint8_t> replies;
     device_.give_answers(driver::monotonic_ns(), replies);
     send(replies);
   }
-  std::string obey(std::string_view line) override { return obey_line(*this, line); }
   [[nodiscard]] std::string status() const override {
     return fmt::format("{}, frames {}, nonsense {}, JTAG {}", state_text(board_), board_.frames_taken(),
                        board_.nonsense(), device_.jtag_transfers());
@@ -154,10 +150,6 @@ class EmulatedUsb final : public EmulatedBoard {
       sent += static_cast<std::size_t>(part > 0 ? part : 0);
     }
   }
-  void go_on_to(std::int64_t time_ns) {
-    time_.advance(board_, time_ns);
-    run_commands_when_braking();
-  }
   void run_commands_when_braking() {
     if (options_.when_braking.empty()) return;
     if (board_.outputs().brake_duty == 0.0) {
@@ -177,15 +169,10 @@ class EmulatedUsb final : public EmulatedBoard {
   emulator::UsbipDevice device_;
   driver::FileDescriptor host_{-1};
   std::int64_t brake_since_ns_{-1};
-  BoardTime time_;
 };
 
 }  // namespace
 
-std::string commands_of_usb() { return help_of(EmulatedUsb::rows()); }
-
-std::unique_ptr<EmulatedBoard> emulated_usb(const EmulatorOptions& options) {
-  return std::make_unique<EmulatedUsb>(options);
-}
+BoardKind usb_kind() { return kind_of<EmulatedUsb>("a USB board"); }
 
 }  // namespace abs_hil::program

@@ -32,16 +32,8 @@ using namespace abs_hil;
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may use only lock-free atomics");
 
-struct Arguments {
-  program::EmulatorOptions emulator{};
-  std::string plant{"paper-table1"};
-  std::vector<std::string> assignments{};
-  std::vector<std::string> faults{};
-  std::vector<std::string> commands{};
-  std::string control_fifo{};
-  int cpu{-1};
-  int priority{81};
-};
+using program::BoardKind;
+using program::EmulatorOptions;
 
 void plain(cli::Parser& parser, const char* names, const cli::Target& to, const char* help) {
   parser.add(names, to, help);
@@ -51,43 +43,42 @@ void shown(cli::Parser& parser, const char* names, const cli::Target& to, const 
   parser.add(names, to, help, {.show_default = true});
 }
 
-void add_card_options(cli::Parser& parser, emulator::CardOptions& card) {
-  shown(parser, "--bitstream", &card.bitstream_version, "version word of the card");
-  plain(parser, "--start-speed", &card.start_speed_rad_s, "both wheels' speed at the start, rad/s");
-  shown(parser, "--overspeed-rpm", &card.overspeed_rpm, "the FPGA's limit (our choice), rpm");
-  shown(parser, "--supply-min", &card.supply_min_V, "the FPGA's limit (our choice), V");
-  shown(parser, "--temperature-max", &card.temperature_max_C, "the FPGA's limit (our choice), deg C");
-  parser.add("--overspeed-bit", &card.overspeed_bit, "overspeed bit of the trip flags (the sources disagree)",
+void add_card_options(cli::Parser& parser, emulator::BoardOptions& board) {
+  shown(parser, "--bitstream", &board.bitstream_version, "version word of the card");
+  plain(parser, "--start-speed", &board.start_speed_rad_s, "both wheels' speed at the start, rad/s");
+  shown(parser, "--overspeed-rpm", &board.overspeed_rpm, "the FPGA's limit (our choice), rpm");
+  shown(parser, "--supply-min", &board.supply_min_V, "the FPGA's limit (our choice), V");
+  shown(parser, "--temperature-max", &board.temperature_max_C, "the FPGA's limit (our choice), deg C");
+  parser.add("--overspeed-bit", &board.overspeed_bit, "overspeed bit of the trip flags (the sources disagree)",
              {.one_of = {"0", "2"}, .show_default = true});
-  plain(parser, "--trip-clears-width", &card.trip_clears_width,
+  plain(parser, "--trip-clears-width", &board.trip_clears_width,
         "a trip also zeroes the PWM width registers (not known of the real card)");
 }
 
-void add_usb_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
+void add_usb_options(cli::Parser& parser, EmulatorOptions& emulator) {
   shown(parser, "--usb-serial", &emulator.identity.serial, "serial number of the USB board");
   shown(parser, "--usb-manufacturer", &emulator.identity.manufacturer, "manufacturer string of the USB board");
   shown(parser, "--vhci", &emulator.controller, "folder of the virtual host controller");
-  parser.add("--hide-outputs", &emulator.usb.shows_outputs,
+  parser.add("--hide-outputs", &emulator.board.shows_outputs,
              "the USB board's frames do not show the sent words (not known of the real board)", {.sets = false});
-  plain(parser, "--enable-line", &emulator.usb.enable_line,
+  plain(parser, "--enable-line", &emulator.board.enable_line,
         "digital line of the USB board, or I/O of the 7I92T, that enables the drive");
   parser.add("--when-braking", &emulator.when_braking,
              "control command of the USB board, obeyed once the brake has acted for 0.3 s", {.repeated = true});
 }
 
-void add_hm2_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
-  emulator.hm2.name.clear();
-  plain(parser, "--board-name", &emulator.hm2.name,
+void add_hm2_options(cli::Parser& parser, EmulatorOptions& emulator) {
+  plain(parser, "--board-name", &emulator.board.name,
         "name that the 7I92T or the node reports, for example 7I92 [7I92T, abs-node]");
   plain(parser, "--mac", &emulator.mac, "MAC address in the EEPROM of the 7I92T or the node: 00:60:1b:16:ab:50");
   parser.add("--wrong-board", &emulator.wrong_words,
              "a word of the 7I92T's description that is another one: 0x458=0x01010204 leaves it one counter",
              {.type = "ADDRESS=VALUE", .repeated = true});
-  plain(parser, "--active-high", &emulator.hm2.active_high_stage,
+  plain(parser, "--active-high", &emulator.board.active_high_stage,
         "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM");
 }
 
-void add_board_options(cli::Parser& parser, program::EmulatorOptions& emulator) {
+void add_board_options(cli::Parser& parser, EmulatorOptions& emulator) {
   cli::Parser board = parser.add_group("board", "the board of the rig", {.least = 1, .most = 1});
   board.add("--pci-root", &emulator.pci_root, "emulate a card: folder at which to mount its tree; created if missing",
             {.type = "DIR"});
@@ -101,40 +92,41 @@ void add_board_options(cli::Parser& parser, program::EmulatorOptions& emulator) 
             {.type = "ADDRESS[:PORT]"});
 }
 
-void add_options(cli::Parser& parser, Arguments& a) {
-  add_board_options(parser, a.emulator);
-  parser.add("--watchdog-ms", &a.emulator.watchdog_ms,
+void add_options(cli::Parser& parser, EmulatorOptions& a) {
+  add_board_options(parser, a);
+  parser.add("--watchdog-ms", &a.board.watchdog_ms,
              "watchdog of the CAN node, ms, until an activation sets another value",
              {.range = {1, 10'000}, .show_default = true});
-  shown(parser, "--bdf", &a.emulator.bdfs,
+  shown(parser, "--bdf", &a.bdfs,
         "the card's address; give it again for more cards, without a rig behind them");
   shown(parser, "--plant", &a.plant, "plant by name or TOML file");
   parser.add("--set", &a.assignments, "any plant value, for example plant.theta_N=30", {.repeated = true});
-  shown(parser, "--seed", &a.emulator.seed, "seed of intermittent faults and garbage");
-  plain(parser, "--lock-step", &a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
+  shown(parser, "--seed", &a.seed, "seed of intermittent faults and garbage");
+  plain(parser, "--lock-step", &a.board.lock_step, "time advances only when the client says so (abs_hil --fast)");
   parser.add("--fault", &a.faults, "fault of one register from the start, for example 88:stuck", {.repeated = true});
   parser.add("--command", &a.commands, "any control command, obeyed at the start", {.repeated = true});
   plain(parser, "--control", &a.control_fifo, "FIFO from which to take commands while running; created if missing");
-  parser.add("--truth", &a.emulator.truth_file, "CSV of true values that no register or frame shows, every ms",
+  parser.add("--truth", &a.truth_file, "CSV of true values that no register or frame shows, every ms",
              {.excludes = {"--can"}});
-  parser.add("--record", &a.emulator.traffic_file, "log of every register access to the card, one per line",
+  parser.add("--record", &a.traffic_file, "log of every register access to the card, one per line",
              {.excludes = {"--can", "--usb", "--hm2", "--node"}});
-  shown(parser, "--vendor", &a.emulator.vendor, "vendor id of the card");
-  shown(parser, "--device", &a.emulator.device, "device id of the card");
-  shown(parser, "--bar-bytes", &a.emulator.bar_bytes, "size of BAR 2");
-  parser.add("--bar-kind", &a.emulator.bar_kind, "io or memory", {.one_of = {"io", "memory"}, .show_default = true});
+  shown(parser, "--vendor", &a.vendor, "vendor id of the card");
+  shown(parser, "--device", &a.device, "device id of the card");
+  shown(parser, "--bar-bytes", &a.bar_bytes, "size of BAR 2");
+  parser.add("--bar-kind", &a.bar_kind, "io or memory", {.one_of = {"io", "memory"}, .show_default = true});
   plain(parser, "--cpu", &a.cpu, "CPU to run on; the client's CPU gives short accesses");
   parser.add("--priority", &a.priority, "SCHED_FIFO priority, higher than the client's; 0: none",
              {.range = {0, 98}, .show_default = true});
-  add_card_options(parser, a.emulator.card);
-  add_usb_options(parser, a.emulator);
-  add_hm2_options(parser, a.emulator);
-  parser.set_footer("Control commands (--command, --control) of a card:\n" + program::commands_of_card() +
-                    "of a CAN node:\n" + program::commands_of_can_node() + "of a USB board:\n" +
-                    program::commands_of_usb() + "of a 7I92T or a node:\n" + program::commands_of_hm2());
+  add_card_options(parser, a.board);
+  add_usb_options(parser, a);
+  add_hm2_options(parser, a);
+  std::string footer = "Control commands (--command, --control) ";
+  for (const BoardKind& kind : {program::card_kind(), program::can_node_kind(), program::usb_kind(), program::hm2_kind()})
+    footer += fmt::format("of {}:\n{}", kind.name, kind.commands);
+  parser.set_footer(footer);
 }
 
-void read_plant(Arguments& a) {
+void read_plant(EmulatorOptions& a) {
   config::Settings s;
   config::KeyTable keys(s);
   config::load_file(config::plant_file(a.plant), keys, config::Tables::of_plant);
@@ -145,7 +137,7 @@ void read_plant(Arguments& a) {
     }
     keys.set_text(assignment, "--set");
   }
-  a.emulator.card.plant = s.plant;
+  a.board.plant = s.plant;
 }
 
 void pin_to(int cpu) {
@@ -159,8 +151,8 @@ void pin_to(int cpu) {
 }
 
 /// Requests real time, if permitted: a card answers at once, but an emulator must wait for the CPU.
-void take_priority(const Arguments& a) {
-  if (a.priority == 0 || a.emulator.lock_step) return;
+void take_priority(const EmulatorOptions& a) {
+  if (a.priority == 0 || a.board.lock_step) return;
   sched_param wanted{};
   wanted.sched_priority = a.priority;
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
@@ -173,7 +165,7 @@ void take_priority(const Arguments& a) {
 constexpr timespec idle{.tv_sec = 0, .tv_nsec = 1'000'000};
 
 /// Serves the board's host and the control FIFO. Ends at a signal, or when the host has gone for good.
-void serve_until_stopped(const Arguments& a, program::EmulatedBoard& board) {
+void serve_until_stopped(const EmulatorOptions& a, program::EmulatedBoard& board) {
   for (const std::string& fault : a.faults) static_cast<void>(board.obey("fault " + fault));
   for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
   program::ControlFifo control(a.control_fifo);
@@ -185,17 +177,18 @@ void serve_until_stopped(const Arguments& a, program::EmulatedBoard& board) {
     wait.tv_nsec = std::clamp<std::int64_t>(board.next_due_ns().value_or(idle.tv_nsec), 0, idle.tv_nsec);
     static_cast<void>(::ppoll(ready.data(), ready.size(), &wait, nullptr));
     if (ready[0].revents != 0) serving = board.serve();
-    if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
+    if (ready[1].revents != 0) control.take(board);
     board.catch_up();
   }
   program::say("ended: " + board.status());
 }
 
-std::unique_ptr<program::EmulatedBoard> make_board(const program::EmulatorOptions& emulator) {
-  if (!emulator.hm2_address.empty() || !emulator.node_address.empty()) return program::emulated_hm2(emulator);
-  if (emulator.use_usb) return program::emulated_usb(emulator);
-  if (!emulator.can_interface.empty()) return program::emulated_can_node(emulator);
-  return program::emulated_card(emulator);
+BoardKind wanted_kind(const EmulatorOptions& a) {
+  if (!a.hm2_address.empty() || !a.node_address.empty()) return program::hm2_kind();
+  if (a.use_usb) return program::usb_kind();
+  if (!a.can_interface.empty()) return program::can_node_kind();
+  if (!a.pci_root.empty()) return program::card_kind();
+  throw std::invalid_argument("--pci-root, --can, --hm2 and --node need a value that is not empty");
 }
 
 int run(int argc, char** argv) {
@@ -203,18 +196,14 @@ int run(int argc, char** argv) {
   cli::Parser parser("",
                      "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node, RT-DAC/USB2 or Mesa 7I92T");
   parser.set_version(version::version_line("abs_rig_emulator"));
-  Arguments arguments;
+  EmulatorOptions arguments;
   add_options(parser, arguments);
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
-  const program::EmulatorOptions& emulator = arguments.emulator;
-  if (!emulator.use_usb && emulator.pci_root.empty() && emulator.can_interface.empty() &&
-      emulator.hm2_address.empty() && emulator.node_address.empty()) {
-    throw std::invalid_argument("--pci-root, --can, --hm2 and --node need a value that is not empty");
-  }
+  const BoardKind kind = wanted_kind(arguments);
   read_plant(arguments);
   pin_to(arguments.cpu);
   take_priority(arguments);
-  serve_until_stopped(arguments, *make_board(emulator));
+  serve_until_stopped(arguments, *kind.make(arguments));
   return program::OutputFile::any_lost() ? 1 : 0;
 }
 

@@ -47,36 +47,18 @@ struct BusFrame {
     for (std::size_t i = count; i > 0; --i) value = value * 256U + data[first + i - 1];
     return value;
   }
-  void put(std::size_t first, std::size_t count, std::int64_t value) {
-    auto rest = static_cast<std::uint64_t>(value);
-    for (std::size_t i = 0; i < count; ++i, rest /= 256U) data[first + i] = static_cast<std::uint8_t>(rest);
-  }
-};
-
-/// Properties of the emulated node. This project chose limits and supply, as for the emulated card.
-struct CanNodeOptions {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::uint16_t watchdog_ms{20};  ///< until an activation sets another value
-  bool lock_step{false};          ///< only ABS_TIME advances the time
-  bool can_fd{true};              ///< answers a SYNC in an FD frame with an FD frame
-  double supply_V{24.0};
-  double supply_min_V{15.0};
-  double temperature_C{30.0};
-  double temperature_max_C{90.0};
-  double overspeed_rpm{2200.0};
 };
 
 /// The CAN I/O node of docs/can.md with the simulated rig behind it. It latches its counters at a SYNC, applies
-/// commands, and zeroes its outputs when valid commands stop. It was written only from config/can/abs_rig.dbc and
-/// shares no code with the driver.
+/// commands, and zeroes its outputs when valid commands stop. In lock-step ABS_TIME advances its time. It was written
+/// only from config/can/abs_rig.dbc and shares no code with the driver.
 class CanNode final : public RigBehind {
  public:
   enum class State : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit CanNode(const CanNodeOptions& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit CanNode(const BoardOptions& options) : RigBehind(options) {
+    log_ = OutputLog("last valid command");
     if (options.watchdog_ms < 1 || options.watchdog_ms > 10000) {
       throw std::invalid_argument("watchdog " + std::to_string(options.watchdog_ms) + " ms: give 1 to 10000");
     }
@@ -94,12 +76,6 @@ class CanNode final : public RigBehind {
   }
   /// The frames that it has sent since the last call, in order.
   [[nodiscard]] std::vector<BusFrame> take_answers() { return std::exchange(answers_, {}); }
-  [[nodiscard]] OutputLog& log() noexcept { return log_; }
-
-  // Events from outside the rig.
-  void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
-  void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
-  void trip_overspeed() noexcept { overspeed_latched_ = true; }
   /// Fault of the power stage: from now on the brake's duty differs by `error` from the command.
   void break_brake_output(double error) noexcept { brake_error_ = error; }
 
@@ -225,74 +201,65 @@ class CanNode final : public RigBehind {
       note_outputs("interlock");
     }
   }
-  void note_outputs(const std::string& why) { log_.note(time_ns(), outputs(), why, last_command_ns_); }
+  [[nodiscard]] std::int64_t last_reload_ns() const noexcept override { return last_command_ns_; }
   [[nodiscard]] std::uint8_t trips_and_state() const noexcept {
     return static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
   }
-  /// Puts the duties that act, brake first.
-  void put_applied(BusFrame& frame, std::size_t first) const {
-    const auto put = [&](std::size_t at, double duty) {
-      frame.put(at, 2, std::llround(std::clamp(duty, 0.0, 1.0) * full_duty));
-    };
-    const Outputs out = outputs();
-    put(first, out.brake_duty);
-    put(first + 2, emergency_stop() ? drive_ : out.drive_duty);
+  /// The duties that act, as words.
+  [[nodiscard]] static std::int64_t word_of(double duty) {
+    return std::llround(std::clamp(duty, 0.0, 1.0) * full_duty);
   }
-  void send(BusFrame frame) {
+  [[nodiscard]] std::int64_t brake_word() const { return word_of(outputs().brake_duty); }
+  [[nodiscard]] std::int64_t drive_word() const { return word_of(emergency_stop() ? drive_ : outputs().drive_duty); }
+  struct Field {
+    std::uint8_t bytes;
+    std::int64_t value;
+  };
+  /// Sends a frame of these fields, low bytes first, with its checksum behind them.
+  void send(std::uint32_t id, std::initializer_list<Field> fields, bool fd = false) {
+    BusFrame frame{.id = id, .fd = fd};
+    for (const Field& field : fields) {
+      auto rest = static_cast<std::uint64_t>(field.value);
+      for (int i = 0; i < field.bytes; ++i, rest /= 256U) frame.data[frame.length++] = static_cast<std::uint8_t>(rest);
+    }
+    ++frame.length;
     frame.seal();
     answers_.push_back(frame);
   }
   void send_status() {
-    BusFrame frame{.id = 0x90, .length = 8};
-    frame.data[0] = trips_and_state();
-    frame.data[1] = latch_reason_;
-    frame.put(2, 2, std::llround(std::clamp(options_.supply_V, 0.0, 65.534) * 1000.0));
-    frame.put(4, 2, std::llround(std::clamp(options_.temperature_C, -300.0, 300.0) * 100.0));
-    frame.data[6] = sync_sequence_;
-    send(frame);
+    const std::int64_t supply_mV = std::llround(std::clamp(options_.supply_V, 0.0, 65.534) * 1000.0);
+    const std::int64_t temperature_cC = std::llround(std::clamp(options_.temperature_C, -300.0, 300.0) * 100.0);
+    send(0x90, {{1, trips_and_state()}, {1, latch_reason_}, {2, supply_mV}, {2, temperature_cC}, {1, sync_sequence_}});
   }
   void send_outputs() {
-    BusFrame frame{.id = 0x91, .length = 8};
-    put_applied(frame, 0);
-    frame.data[4] = static_cast<std::uint8_t>(rejected_);
-    frame.data[5] = command_sequence_;
-    frame.data[6] = sync_sequence_;
-    send(frame);
+    const auto rejected = static_cast<std::int64_t>(rejected_);
+    send(0x91, {{2, brake_word()}, {2, drive_word()}, {1, rejected}, {1, command_sequence_}, {1, sync_sequence_}});
   }
   void send_encoders(bool fd) {
     const std::int64_t upper = position(true) - upper_zero_;
     const std::int64_t lower = position(false) - lower_zero_;
     const std::int64_t time_us = time_ns() / 1000;
+    constexpr std::int64_t lever = 0;  // it is at rest
     if (fd) {
-      BusFrame frame{.id = 0x94, .length = 24, .fd = true};
-      frame.put(0, 4, upper);
-      frame.put(4, 4, lower);
-      frame.put(12, 4, time_us);
-      put_applied(frame, 16);
-      frame.data[20] = trips_and_state();
-      frame.data[21] = command_sequence_;
-      frame.data[22] = sync_sequence_;
-      send(frame);
+      send(0x94,
+           {{4, upper},
+            {4, lower},
+            {4, lever},
+            {4, time_us},
+            {2, brake_word()},
+            {2, drive_word()},
+            {1, trips_and_state()},
+            {1, command_sequence_},
+            {1, sync_sequence_}},
+           true);
       return;
     }
-    BusFrame encoders{.id = 0x92, .length = 8};
-    encoders.put(0, 3, upper);
-    encoders.put(3, 3, lower);
-    encoders.data[6] = sync_sequence_;
-    send(encoders);
-    BusFrame latch{.id = 0x93, .length = 8};
-    latch.put(0, 4, time_us);
-    latch.put(4, 2, std::int64_t{static_cast<unsigned>(state_)} << 12U);  // the lever is at rest
-    latch.data[6] = sync_sequence_;
-    send(latch);
+    send(0x92, {{3, upper}, {3, lower}, {1, sync_sequence_}});
+    send(0x93, {{4, time_us}, {2, lever | std::int64_t{static_cast<unsigned>(state_)} << 12U}, {1, sync_sequence_}});
   }
   void send_identity() {
-    BusFrame frame{.id = 0x9A, .length = 8};
-    frame.data[0] = 1;
-    frame.data[1] = static_cast<std::uint8_t>((options_.lock_step ? 1U : 0U) | (options_.can_fd ? 2U : 0U));
-    frame.put(2, 2, nonce_);
-    frame.put(4, 2, options_.watchdog_ms);
-    send(frame);
+    const unsigned knows = (options_.lock_step ? 1U : 0U) | (options_.can_fd ? 2U : 0U);
+    send(0x9A, {{1, 1}, {1, knows}, {2, nonce_}, {2, options_.watchdog_ms}, {1, 0}});
   }
   [[nodiscard]] bool guarded() const noexcept { return state_ == State::active && (brake_ > 0.0 || drive_ > 0.0); }
   [[nodiscard]] std::int64_t watchdog_ends_ns() const noexcept {
@@ -306,7 +273,6 @@ class CanNode final : public RigBehind {
     check_interlocks();
   }
 
-  CanNodeOptions options_;
   State state_{State::inactive};
   std::uint8_t latch_reason_{0};
   double brake_{0.0};
@@ -327,7 +293,6 @@ class CanNode final : public RigBehind {
   bool host_time_known_{false};
   std::uint64_t host_time_{0};
   std::vector<BusFrame> answers_{};
-  OutputLog log_{"last valid command"};
 };
 
 /// Applies a fault between a node and its bus. The names are those of the control command `fault NAME[=NUMBER]`.

@@ -107,9 +107,8 @@ void NodeFaults::set(std::string_view text) {
   std::array<FaultName, rows.size()> names{};
   std::ranges::transform(rows, names.begin(), &Row::name);
   const auto given = fault_in(text, names);
-  if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
-  row_ = given->place;
-  number_ = static_cast<unsigned>(given->number);
+  row_ = given.place;
+  number_ = static_cast<unsigned>(given.number);
   kept_.clear();
 }
 

@@ -20,24 +20,6 @@
 
 namespace abs_hil::emulator {
 
-/// Properties of the emulated card and limits of its FPGA. Where the maker's sources give no value, this project chose
-/// the default ("our choice"). Where they are silent or disagree, an option selects the variant, so that tests cover
-/// both.
-struct CardOptions {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};                 ///< both wheels' speed at power-on, >= 0
-  std::uint32_t bitstream_version{0xAB5};        ///< our choice: the real word is not public
-  std::uint32_t channel_counts{0x3200};          ///< 3 counters (15:12), 2 timers (11:8); our choice
-  double supply_V{24.0};                         ///< our choice; 0 = no supply
-  double supply_min_V{15.0};                     ///< our choice
-  double temperature_C{30.0};                    ///< our choice
-  std::uint32_t temperature_max_C{90};           ///< our choice
-  double overspeed_rpm{2200.0};                  ///< our choice; in the vendor's demo the lower wheel reaches 1700
-  std::uint32_t velocity_period_ticks{400'000};  ///< ticks of 40 MHz; our choice: 10 ms
-  std::uint32_t overspeed_bit{0};                ///< bit 0 or 2 of the trip flags; temperature has the other one
-  bool trip_clears_width{false};                 ///< a trip zeroes the width registers as well as the outputs
-};
-
 /// Both PWMs' width registers and the times of their changes; card's clock, 0 at power-on.
 struct PwmWidths {
   std::uint32_t drive{0};
@@ -54,12 +36,11 @@ class CardModel final : public RigBehind {
   static constexpr std::uint32_t bytes = 256;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit CardModel(const CardOptions& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit CardModel(const BoardOptions& options) : RigBehind(options) {
     if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
       throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
     }
-    plain_[0x50 / 4] = options.velocity_period_ticks;
+    plain_[0x50 / 4] = 400'000;  // ticks of 40 MHz, 10 ms: our choice
     plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
     plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
     plain_[0xA8 / 4] = options.temperature_max_C;
@@ -70,14 +51,14 @@ class CardModel final : public RigBehind {
     const plant_sim::PlantState& s = plant().state();
     switch (offset) {
       case 0x00: return options_.bitstream_version;
-      case 0x04: return options_.channel_counts;
+      case 0x04: return 0x3200;  // 3 counters (15:12), 2 timers (11:8): our choice
       case 0x38: return supply_raw(options_.supply_V);
       case 0x54: return velocity(s.omega2_rad_s);
       case 0x58: return velocity(s.omega1_rad_s);
       case 0x60: return pwm_index_;
       case 0x64:
       case 0x68:
-      case 0x6C: return read_pwm(offset);
+      case 0x6C: return pwm_index_ < pwm_count ? pwm_[pwm_index_][(offset - 0x64) / 4] : 0;
       case 0x80: return encoder_index_;
       case 0x84: return reset_mask_;
       case 0x88:
@@ -108,19 +89,16 @@ class CardModel final : public RigBehind {
     }
   }
 
-  // Events from outside the rig, except those of the host.
-  void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
-  void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
-  void trip_overspeed() noexcept {
-    overspeed_latched_ = true;
+  void trip_overspeed() noexcept override {
+    RigBehind::trip_overspeed();
     enforce_limits();
   }
 
   [[nodiscard]] Outputs outputs() const noexcept override {
     if (trip_flags() != 0) return {};
     const auto duty = [](const PwmChannel& channel) {
-      const std::uint32_t full = channel.mode == 1 ? 4095 : 255;
-      return static_cast<double>(std::min(channel.width, full)) / static_cast<double>(full);
+      const std::uint32_t full = channel[mode] == 1 ? 4095 : 255;
+      return static_cast<double>(std::min(channel[width], full)) / static_cast<double>(full);
     };
     return {.drive_duty = emergency_stop() ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
   }
@@ -153,38 +131,25 @@ class CardModel final : public RigBehind {
 
   static std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(supply_scale_V / volts) : 0; }
 
-  struct PwmChannel {
-    std::uint32_t mode{1};
-    std::uint32_t prescaler{60};
-    std::uint32_t width{0};
-  };
+  enum PwmRegister : std::uint32_t { mode, prescaler, width };  // from offset 64
+  using PwmChannel = std::array<std::uint32_t, 3>;
   static constexpr std::uint32_t pwm_count = 2;
   static constexpr std::uint32_t encoder_count = 3;
 
   void note_widths(std::int64_t written_ns) noexcept {
     const bool were_zero = widths_.drive == 0 && widths_.brake == 0;
-    widths_.drive = pwm_[0].width;
-    widths_.brake = pwm_[1].width;
+    widths_.drive = pwm_[0][width];
+    widths_.brake = pwm_[1][width];
     widths_.last_written_ns = written_ns;
     if (!were_zero) widths_.zero_since_ns = time_ns();
   }
-  [[nodiscard]] std::uint32_t read_pwm(std::uint32_t offset) const noexcept {
-    if (pwm_index_ >= pwm_count) return 0;
-    const PwmChannel& channel = pwm_[pwm_index_];
-    if (offset == 0x64) return channel.mode;
-    return offset == 0x68 ? channel.prescaler : channel.width;
-  }
   void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
     if (pwm_index_ >= pwm_count) return;
-    PwmChannel& channel = pwm_[pwm_index_];
-    if (offset == 0x64) {
-      channel.mode = value & 1U;
-    } else if (offset == 0x68) {
-      channel.prescaler = value & 0xFFFFU;
-    } else if (!options_.trip_clears_width || trip_flags() == 0) {
-      channel.width = value & 0xFFFU;
-    }
-    if (offset == 0x6C) note_widths(time_ns());
+    constexpr std::array<std::uint32_t, 3> bits{1, 0xFFFF, 0xFFF};
+    const std::uint32_t which = (offset - 0x64) / 4;
+    const bool locked = which == width && options_.trip_clears_width && trip_flags() != 0;
+    if (!locked) pwm_[pwm_index_][which] = value & bits[which];
+    if (which == width) note_widths(time_ns());
   }
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept {
     // 0 is the lower wheel, 1 the upper wheel, 2 the lever, which is at rest.
@@ -197,37 +162,19 @@ class CardModel final : public RigBehind {
   void enforce_limits() noexcept {
     latch_overspeed(velocity(fastest_rad_s()) > plain_[0x5C / 4]);
     if (options_.trip_clears_width && trip_flags() != 0) {
-      for (PwmChannel& channel : pwm_) channel.width = 0;
+      for (PwmChannel& channel : pwm_) channel[width] = 0;
       note_widths(widths_.last_written_ns);
     }
   }
   void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { enforce_limits(); }
 
-  CardOptions options_;
   std::uint32_t pwm_index_{0};
-  std::array<PwmChannel, pwm_count> pwm_{};
+  std::array<PwmChannel, pwm_count> pwm_{{{1, 60, 0}, {1, 60, 0}}};
   PwmWidths widths_{};
   std::uint32_t encoder_index_{0};
   std::uint32_t reset_mask_{0};
   std::array<std::uint32_t, encoder_count> zero_{};  ///< raw count at which each counter shows 0
   std::array<std::uint32_t, bytes / 4> plain_{};     ///< registers that only store the written value
-};
-
-/// Faults of one register. The names are those of `--fault OFFSET:NAME[=PARAMETER]`.
-enum class FaultKind : std::uint8_t {
-  ok,            ///< no fault: heals the register
-  stuck,         ///< keeps the value that it had when the fault began; writes are lost
-  wrong,         ///< reads its value plus the parameter
-  slow,          ///< each access takes the parameter in us
-  delayed,       ///< reads the value of n reads ago (n: parameter)
-  intermittent,  ///< each access fails with the given probability
-  off,           ///< every access fails
-  garbage,       ///< reads random values
-};
-
-struct Fault {
-  FaultKind kind{FaultKind::ok};
-  double parameter{0.0};
 };
 
 /// Result of one access for the host.
@@ -242,43 +189,36 @@ class FaultyCard {
  public:
   FaultyCard(CardModel& card, std::uint64_t seed) : card_(card), random_(seed) {}
 
-  /// Begins or (`ok`) ends a fault of the register at `offset`.
-  void set(std::uint32_t offset, const Fault& fault) {
-    faults_.erase(offset);
-    if (fault.kind != FaultKind::ok) faults_[offset] = {.fault = fault, .stuck_at = card_.read32(offset)};
-  }
-  /// Sets a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid faults.
+  /// Begins or (`ok`) ends a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid
+  /// faults.
   void set(std::string_view text) {
-    const std::size_t colon = text.find(':');
-    const auto offset = colon == std::string_view::npos ? std::nullopt : offset_in(text.substr(0, colon));
-    const auto given = offset ? fault_in(text.substr(colon + 1), register_faults) : std::nullopt;
-    if (!given) {
-      refuse_fault(text, "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of " +
-                             usages_of(register_faults, ", "));
-    }
-    set(*offset, {.kind = static_cast<FaultKind>(given->place), .parameter = given->number});
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const std::uint32_t offset = offset_in(text.substr(0, colon));
+    const bool known = offset < CardModel::bytes;
+    const GivenFault given =
+        fault_in(known ? text.substr(std::min(colon + 1, text.size())) : "", register_faults, text,
+                 "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of ", ", ");
+    const std::string_view kind = register_faults[given.place].name();
+    faults_.erase(offset);
+    if (kind != "ok") faults_[offset] = {.kind = kind, .parameter = given.number, .stuck_at = card_.read32(offset)};
   }
   void answer_all_ones(bool on) noexcept { all_ones_ = on; }
 
   AccessResult read32(std::uint32_t offset) {
-    using enum FaultKind;
     if (all_ones_) return {.value = ~0U};
     AccessResult result{.value = card_.read32(offset)};
     const auto found = faults_.find(offset);
     if (found == faults_.end()) return result;
-    State& state = found->second;
-    if (fails(state.fault)) return {.failed = true};
-    switch (state.fault.kind) {
-      case stuck: result.value = state.stuck_at; break;
-      case wrong: result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(state.fault.parameter)); break;
-      case slow: result.delay_ns = static_cast<std::int64_t>(state.fault.parameter * 1e3); break;
-      case garbage: result.value = static_cast<std::uint32_t>(random_() >> 32U); break;
-      case delayed:
-        state.earlier.push_back(result.value);
-        result.value = state.earlier.front();
-        if (static_cast<double>(state.earlier.size()) > state.fault.parameter) state.earlier.pop_front();
-        break;
-      default: break;
+    Fault& fault = found->second;
+    if (fails(fault)) return {.failed = true};
+    result.delay_ns = fault.delay_ns();
+    if (fault.kind == "stuck") result.value = fault.stuck_at;
+    if (fault.kind == "wrong") result.value += static_cast<std::uint32_t>(static_cast<std::int64_t>(fault.parameter));
+    if (fault.kind == "garbage") result.value = static_cast<std::uint32_t>(random_() >> 32U);
+    if (fault.kind == "delayed") {
+      fault.earlier.push_back(result.value);
+      result.value = fault.earlier.front();
+      if (static_cast<double>(fault.earlier.size()) > fault.parameter) fault.earlier.pop_front();
     }
     return result;
   }
@@ -286,46 +226,52 @@ class FaultyCard {
     if (all_ones_) return {};  // the card is not on the bus: the write is lost
     AccessResult result;
     if (const auto found = faults_.find(offset); found != faults_.end()) {
-      const Fault& fault = found->second.fault;
+      const Fault& fault = found->second;
       if (fails(fault)) return {.failed = true};
-      if (fault.kind == FaultKind::stuck) return {};
-      if (fault.kind == FaultKind::slow) result.delay_ns = static_cast<std::int64_t>(fault.parameter * 1e3);
+      if (fault.kind == "stuck") return {};
+      result.delay_ns = fault.delay_ns();
     }
     card_.write32(offset, value);
     return result;
   }
 
  private:
-  // In the order of FaultKind.
-  static constexpr std::array<FaultName, 8> register_faults{{{"ok"},
-                                                             {"stuck"},
-                                                             {"wrong=ADDEND", -2147483648.0, 2147483648.0},
-                                                             {"slow=US", 0.0, 10e6},
-                                                             {"delayed=READS", 1.0, 1e5},
-                                                             {"intermittent=PROBABILITY", 0.0, 1.0},
-                                                             {"off"},
-                                                             {"garbage"}}};
+  static constexpr std::array<FaultName, 8> register_faults{{
+      {"ok"},     // no fault: heals the register
+      {"stuck"},  // keeps the value that it had when the fault began; writes are lost
+      {"wrong=ADDEND", -2147483648.0, 2147483648.0},  // reads its value plus this
+      {"slow=US", 0.0, 10e6},                         // each access takes so long
+      {"delayed=READS", 1.0, 1e5},                    // reads the value of so many reads ago
+      {"intermittent=PROBABILITY", 0.0, 1.0},         // each access fails with it
+      {"off"},                                        // every access fails
+      {"garbage"},                                    // reads random values
+  }};
 
-  static std::optional<std::uint32_t> offset_in(std::string_view digits) {
+  /// CardModel::bytes if the text is no register's offset.
+  static std::uint32_t offset_in(std::string_view digits) {
     if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
-    const auto offset = rig::parse_number<std::uint32_t>(digits, 16);
-    return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
+    const std::uint32_t offset = rig::parse_number<std::uint32_t>(digits, 16).value_or(CardModel::bytes);
+    return offset % 4 == 0 ? std::min(offset, CardModel::bytes) : CardModel::bytes;
   }
 
-  struct State {
-    Fault fault{};
+  struct Fault {
+    std::string_view kind{};
+    double parameter{0.0};
     std::uint32_t stuck_at{0};
     std::deque<std::uint32_t> earlier{};
+
+    [[nodiscard]] std::int64_t delay_ns() const {
+      return kind == "slow" ? static_cast<std::int64_t>(parameter * 1e3) : 0;
+    }
   };
   [[nodiscard]] bool fails(const Fault& fault) {
-    using enum FaultKind;
-    if (fault.kind == off) return true;
-    return fault.kind == intermittent && static_cast<double>(random_() >> 11U) * 0x1p-53 < fault.parameter;
+    if (fault.kind == "off") return true;
+    return fault.kind == "intermittent" && static_cast<double>(random_() >> 11U) * 0x1p-53 < fault.parameter;
   }
 
   CardModel& card_;
   std::mt19937_64 random_;
-  std::map<std::uint32_t, State> faults_{};
+  std::map<std::uint32_t, Fault> faults_{};
   bool all_ones_{false};
 };
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -29,32 +28,31 @@ struct FaultName {
   [[nodiscard]] bool takes_number() const { return usage.find('=') != std::string_view::npos; }
 };
 
-/// All usages in a row.
-[[nodiscard]] inline std::string usages_of(std::span<const FaultName> names, std::string_view between) {
-  std::string text;
-  for (const FaultName& name : names) text.append(text.empty() ? "" : between).append(name.usage);
-  return text;
-}
-
 /// A fault as a user gave it: its place in the table of names, and its number, 0 if it takes none.
 struct GivenFault {
   std::size_t place{0};
   double number{0.0};
 };
-/// Nothing if `text` is no fault of the table.
-[[nodiscard]] inline std::optional<GivenFault> fault_in(std::string_view text, std::span<const FaultName> names) {
+/// The fault of the table that `text` names. Throws std::invalid_argument with `whole`, the text as the user gave it,
+/// `valid`, and the table.
+[[nodiscard]] inline GivenFault fault_in(std::string_view text, std::span<const FaultName> names,
+                                         std::string_view whole, std::string_view valid, std::string_view between) {
   const std::size_t equals = text.find('=');
   for (std::size_t place = 0; place < names.size(); ++place) {
     const FaultName& name = names[place];
     if (name.name() != text.substr(0, equals) || name.takes_number() != (equals != std::string_view::npos)) continue;
-    if (!name.takes_number()) return GivenFault{place};
+    if (!name.takes_number()) return {place};
     const std::string_view digits = text.substr(equals + 1);
     const auto number = rig::parse_number<double>(digits);
-    if (!number || !(*number >= name.least && *number <= name.most)) return std::nullopt;
-    if (name.whole && !rig::parse_number<unsigned>(digits)) return std::nullopt;
-    return GivenFault{place, *number};
+    const bool fits = number && *number >= name.least && *number <= name.most;
+    if (fits && (!name.whole || rig::parse_number<unsigned>(digits))) return {place, *number};
   }
-  return std::nullopt;
+  std::string all;
+  for (const FaultName& name : names) all.append(all.empty() ? "" : between).append(name.usage);
+  refuse_fault(whole, std::string(valid) + all);
+}
+[[nodiscard]] inline GivenFault fault_in(std::string_view text, std::span<const FaultName> names) {
+  return fault_in(text, names, text, "one of ", " ");
 }
 
 }  // namespace abs_hil::emulator

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "emulator/hm2_fpga.hpp"
 
@@ -46,7 +47,7 @@ constexpr std::uint32_t flash_id = 0x14;
 
 class Hm2Board final : public Hm2Fpga {
  public:
-  explicit Hm2Board(const Hm2Options& options) : Hm2Fpga(options) { start(); }
+  explicit Hm2Board(const BoardOptions& options) : Hm2Fpga(options) { start(); }
 
   [[nodiscard]] std::vector<std::uint8_t> answer(std::span<const std::uint8_t> datagram) override {
     bump(control, rx_packets);
@@ -139,19 +140,12 @@ class Hm2Board final : public Hm2Fpga {
   }
   [[nodiscard]] std::uint32_t info_word(std::uint32_t space, std::uint32_t address) const noexcept {
     const SpaceFacts& facts = spaces[space];
-    switch (address) {
-      case 0x00: return 0x5A00U + space;
-      case 0x02: return space == lock_step && !options_.lock_step ? 0 : facts.sizes;
-      case 0x04: return facts.ranges;
-      case 0x06: return pointers_[space];
-      case 0x08:
-      case 0x0A:
-      case 0x0C:
-      case 0x0E:
-        return static_cast<std::uint8_t>(facts.name[address - 8]) |
-               static_cast<std::uint32_t>(static_cast<std::uint8_t>(facts.name[address - 7])) << 8U;
-      default: return 0;
-    }
+    const bool absent = space == lock_step && !options_.lock_step;
+    std::array<std::uint16_t, 8> words{static_cast<std::uint16_t>(0x5A00U + space),
+                                       absent ? std::uint16_t{0} : facts.sizes, facts.ranges,
+                                       static_cast<std::uint16_t>(pointers_[space])};
+    std::memcpy(&words[4], facts.name, 8);
+    return address % 2 == 0 && address / 2 < words.size() ? words[address / 2] : 0;
   }
   [[nodiscard]] std::uint64_t read(const Access& access, std::uint32_t address) const noexcept {
     if (access.info) return info_word(access.space, address);
@@ -174,18 +168,15 @@ class Hm2Board final : public Hm2Fpga {
     if (read_only || locked) return count_error(write_error);
     put(access.space, address, access.unit_bytes, value);
     if (access.space == eeprom) put(control, eeprom_enable, 2, 0);  // the key opens it for one write
-    if (access.space == control) write_control(address);
+    const bool asks = access.space == control && bytes(memory_[control], address, 2) != 0;
+    if (asks && address == reset_register) return power_cycle();
+    if (asks && address == reload_register) {
+      put(control, address, 2, 0);
+      power_on();
+    }
     if (access.space == lock_step && address + access.unit_bytes == 8) {
       advance_to(static_cast<std::int64_t>(std::min<std::uint64_t>(
           bytes(memory_[lock_step], 0, 8), static_cast<std::uint64_t>(time_ns()) + 10'000'000'000U)));
-    }
-  }
-  void write_control(std::uint32_t address) {
-    if (address == reset_register && bytes(memory_[control], address, 2) != 0) {
-      power_cycle();
-    } else if (address == reload_register && bytes(memory_[control], address, 2) != 0) {
-      put(control, address, 2, 0);
-      power_on();
     }
   }
   void count_error(std::uint32_t bit) {
@@ -216,6 +207,6 @@ class Hm2Board final : public Hm2Fpga {
 
 }  // namespace
 
-std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options) { return std::make_unique<Hm2Board>(options); }
+std::unique_ptr<UdpBoard> hm2_board(const BoardOptions& options) { return std::make_unique<Hm2Board>(options); }
 
 }  // namespace abs_hil::emulator

@@ -1,6 +1,7 @@
 // What a 7I92 with firmware G540x2 says about itself.
 
 #include <algorithm>
+#include <cstring>
 
 #include "emulator/udp_board.hpp"
 
@@ -12,12 +13,6 @@ constexpr std::uint32_t idrom = 0x400;
 constexpr std::uint32_t modules = 0x440;
 constexpr std::uint32_t pins = 0x600;
 constexpr std::uint32_t pin_count = 34;
-
-constexpr std::uint32_t text_word(const char (&four)[5]) {
-  std::uint32_t word = 0;
-  for (std::size_t i = 4; i > 0; --i) word = word * 256U + static_cast<std::uint8_t>(four[i - 1]);
-  return word;
-}
 
 /// Module descriptors in the order of the recording with LinuxCNC: watchdog, I/O ports, counters, PWM, LEDs.
 constexpr std::array<std::uint32_t, 15> module_table{
@@ -34,15 +29,15 @@ constexpr std::uint32_t pin(std::uint32_t number, std::uint32_t tag, std::uint32
 std::vector<std::uint32_t> stock_words() {
   std::vector<std::uint32_t> words(pins / 4 + 512 / 4, 0);
   words[0x100 / 4] = 0x55AACAFE;
-  words[0x104 / 4] = text_word("HOST");
-  words[0x108 / 4] = text_word("MOT2");
+  std::memcpy(&words[0x104 / 4], "HOSTMOT2", 8);
   words[0x10C / 4] = idrom;
-  const std::array<std::uint32_t, 16> header{
-      3,   modules - idrom, pins - idrom, text_word("MESA"), text_word("7I92"),
-      9,    // size of the FPGA
-      144,  // its pins
-      2,   pin_count,       17,           100'000'000,       200'000'000,       4, 64, 256, 4};
+  const std::array<std::uint32_t, 16> header{3,   modules - idrom, pins - idrom, 0,           0,  // its name follows
+                                             9,                                                   // size of the FPGA
+                                             144,                                                 // its pins
+                                             2,   pin_count,       17,           100'000'000, 200'000'000, 4, 64, 256,
+                                             4};
   std::copy(header.begin(), header.end(), words.begin() + idrom / 4);
+  std::memcpy(&words[idrom / 4 + 3], "MESA7I92", 8);
   std::copy(module_table.begin(), module_table.end(), words.begin() + modules / 4);
   for (std::uint32_t io = 0; io < pin_count; ++io) words[pins / 4 + io] = pin(0, 0, 0);
   for (std::uint32_t unit = 0; unit < 2; ++unit) {

@@ -36,7 +36,7 @@ void for_each_command(std::span<const std::uint8_t> datagram, Use use) {
 /// The chip's loop looks at the counters and the watchdog at every step of the rig and at every datagram.
 class NodeBoard final : public UdpBoard {
  public:
-  explicit NodeBoard(const Hm2Options& options) : UdpBoard(options) {
+  explicit NodeBoard(const BoardOptions& options) : UdpBoard(options) {
     std::memcpy(identity_.name, options.name.data(), options.name.size());
     std::memcpy(identity_.idrom_name, options.name.starts_with("7I92") ? "MESA7I92" : "ABS-NODE", 8);
     std::memcpy(identity_.mac, options.mac.data(), sizeof identity_.mac);
@@ -86,7 +86,7 @@ class NodeBoard final : public UdpBoard {
 
   [[nodiscard]] Outputs outputs() const noexcept override {
     const auto duty = [this](std::uint32_t channel) { return node_duty(&core_, channel) / 4096.0; };
-    const bool enabled = options_.enable_pin < 0 || node_output(&core_);
+    const bool enabled = options_.enable_line < 0 || node_output(&core_);
     return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(0), .brake_duty = duty(1)};
   }
   [[nodiscard]] bool bitten() const noexcept override { return core_.latched; }
@@ -156,10 +156,9 @@ class NodeBoard final : public UdpBoard {
     if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
     note_outputs("watchdog");
   }
-  void note_outputs(const std::string& why) override {
-    const auto since_us = static_cast<std::int64_t>(now_us() - core_.fed_us);
+  [[nodiscard]] std::int64_t last_reload_ns() const noexcept override {
     const bool never = core_.watchdog_clocks == 0x80000000U;
-    log_.note(time_ns(), outputs(), why, never ? -1 : time_ns() - 1000 * since_us);
+    return never ? -1 : time_ns() - 1000 * static_cast<std::int64_t>(now_us() - core_.fed_us);
   }
 
   node_identity identity_{};
@@ -170,6 +169,6 @@ class NodeBoard final : public UdpBoard {
 
 }  // namespace
 
-std::unique_ptr<UdpBoard> node_board(const Hm2Options& options) { return std::make_unique<NodeBoard>(options); }
+std::unique_ptr<UdpBoard> node_board(const BoardOptions& options) { return std::make_unique<NodeBoard>(options); }
 
 }  // namespace abs_hil::emulator

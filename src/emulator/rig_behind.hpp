@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -16,6 +17,47 @@
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
+
+/// Words of a board's description by their addresses.
+using Hm2Words = std::vector<std::pair<std::uint16_t, std::uint32_t>>;
+
+/// Properties of the emulated boards, their limits and their wiring to the rig. Where the makers' sources give no value,
+/// this project chose the default ("our choice"). Where they are silent or disagree, an option selects the variant, so
+/// that tests cover both.
+struct BoardOptions {
+  plant_sim::PlantOptions plant{};
+  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
+  bool lock_step{false};          ///< only the host advances the time
+  // Of the card and the CAN node: our choice.
+  double supply_V{24.0};  ///< 0 = no supply
+  double supply_min_V{15.0};
+  double temperature_C{30.0};
+  std::uint32_t temperature_max_C{90};
+  double overspeed_rpm{2200.0};  ///< in the vendor's demo the lower wheel reaches 1700
+  // Of the card.
+  std::uint32_t bitstream_version{0xAB5};  ///< our choice: the real word is not public
+  std::uint32_t overspeed_bit{0};          ///< bit 0 or 2 of the trip flags; temperature has the other one
+  bool trip_clears_width{false};           ///< a trip zeroes the width registers as well as the outputs
+  // Of the USB board.
+  std::uint16_t version{103};  ///< our choice: the real word is not public
+  std::uint32_t drive_pwm{0};  ///< PWM channel wired to the drive, 0 ... 9
+  std::uint32_t brake_pwm{1};
+  std::uint32_t lower_encoder{0};  ///< encoder channel of the lower wheel, 0 ... 7
+  std::uint32_t upper_encoder{1};
+  bool shows_outputs{true};  ///< frames show the PWM and digital words that were sent; not known of the real board
+  /// What enables the drive, -1: nothing: a digital line of the USB board, 0 ... 14, or an I/O of the 7I92T with the
+  /// stage's active level, 0 ... 33.
+  std::int32_t enable_line{-1};
+  // Of the CAN node.
+  std::uint16_t watchdog_ms{20};  ///< until an activation sets another value
+  bool can_fd{true};              ///< answers a SYNC in an FD frame with an FD frame
+  // Of the 7I92T and the node.
+  std::string name{"7I92T"};  ///< 1 to 16 characters
+  std::array<std::uint8_t, 6> mac{0x00, 0x60, 0x1B, 0x16, 0xAB, 0x50};
+  std::array<std::uint8_t, 4> address{192, 168, 1, 121};  ///< as EEPROM and mesaflash show it
+  bool active_high_stage{false};  ///< the power stages act while their pins are high: full PWM after a bite
+  Hm2Words words{};               ///< in place of those of its description: another firmware, or an impossible one
+};
 
 /// Duties that reach the power stage, after mode, width, interlocks and E-stop. No cap applies here.
 struct Outputs {
@@ -80,8 +122,12 @@ class RigBehind {
   static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the board's interlocks run at 10 kHz
 
   /// Both wheels start at the same speed. Throws std::invalid_argument unless it is finite and >= 0.
-  RigBehind(const plant_sim::PlantOptions& plant, double start_speed_rad_s)
-      : plant_(plant), upper_(plant_sim::upper_encoder(plant)), lower_(plant_sim::lower_encoder(plant)) {
+  explicit RigBehind(const BoardOptions& options)
+      : options_(options),
+        plant_(options.plant),
+        upper_(plant_sim::upper_encoder(options.plant)),
+        lower_(plant_sim::lower_encoder(options.plant)) {
+    const double start_speed_rad_s = options.start_speed_rad_s;
     if (!(start_speed_rad_s >= 0.0) || !std::isfinite(start_speed_rad_s)) {
       throw std::invalid_argument("start speed " + std::to_string(start_speed_rad_s) +
                                   " rad/s: give a finite value >= 0");
@@ -110,7 +156,11 @@ class RigBehind {
     }
   }
 
+  // Events from outside the rig, except those of the host.
   virtual void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }  ///< cuts the drive only
+  void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
+  void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
+  virtual void trip_overspeed() noexcept { overspeed_latched_ = true; }
   /// Turns a standing wheel by hand.
   virtual void turn_by_hand(bool upper_wheel, double revolutions) {
     plant_sim::PlantState state = plant_.state();
@@ -121,6 +171,7 @@ class RigBehind {
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
   /// True speeds and torques for the emulator's own log; the board does not show them.
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
+  [[nodiscard]] OutputLog& log() noexcept { return log_; }
 
  protected:
   RigBehind(const RigBehind&) = default;
@@ -149,9 +200,15 @@ class RigBehind {
   void latch_overspeed(bool too_fast) noexcept {
     overspeed_latched_ = too_fast || (overspeed_latched_ && fastest_rad_s() >= standstill_rad_s);
   }
-  bool overspeed_latched_{false};
-
   [[nodiscard]] bool emergency_stop() const noexcept { return emergency_stop_; }
+  /// Notes the duties in the log if they have changed.
+  void note_outputs(const std::string& why) { log_.note(time_ns_, outputs(), why, last_reload_ns()); }
+  /// When the watchdog was last reloaded; -1: never, or there is none.
+  [[nodiscard]] virtual std::int64_t last_reload_ns() const noexcept { return -1; }
+
+  BoardOptions options_;
+  OutputLog log_{};
+  bool overspeed_latched_{false};
 
  private:
   plant_sim::Plant plant_;

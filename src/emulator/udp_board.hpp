@@ -12,27 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "abs_hil/plant_sim/options.hpp"
 #include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
-
-/// Words of a board's description by their addresses.
-using Hm2Words = std::vector<std::pair<std::uint16_t, std::uint32_t>>;
-
-/// Properties of the emulated Mesa 7I92T and of its wiring to the rig.
-struct Hm2Options {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::string name{"7I92T"};      ///< 1 to 16 characters
-  std::array<std::uint8_t, 6> mac{0x00, 0x60, 0x1B, 0x16, 0xAB, 0x50};
-  std::array<std::uint8_t, 4> address{192, 168, 1, 121};  ///< as EEPROM and mesaflash show it
-  std::int32_t enable_pin{-1};    ///< I/O that enables the drive with the stage's active level, 0 ... 33; -1: none
-  bool active_high_stage{false};  ///< the power stages act while their pins are high: full PWM after a bite
-  bool lock_step{false};          ///< only a write to space 5 advances the time
-  Hm2Words words{};               ///< in place of those of its description: another firmware, or an impossible one
-};
 
 /// The part of a HostMot2's registers that never changes: cookie, IDROM, module and pin descriptors of the firmware
 /// G540x2 on a 7I92.
@@ -52,8 +35,7 @@ struct Hm2Identity {
 class UdpBoard : public RigBehind {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit UdpBoard(const Hm2Options& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit UdpBoard(const BoardOptions& options) : RigBehind(options) {
     if (!options.name.empty() && options.name.size() <= 16) return;
     throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
   }
@@ -76,16 +58,10 @@ class UdpBoard : public RigBehind {
   [[nodiscard]] virtual bool drives_pins() const noexcept = 0;
   /// Datagrams with a command that writes something that acts: activations, commands, zeros.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
-  [[nodiscard]] OutputLog& log() noexcept { return log_; }
   /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
   [[nodiscard]] virtual std::string registers_text() const = 0;
 
  protected:
-  /// Notes the duties in the log if they have changed.
-  virtual void note_outputs(const std::string& why) = 0;
-
-  Hm2Options options_;
-  OutputLog log_{};
   std::uint64_t writes_{0};
 };
 
@@ -99,12 +75,12 @@ inline constexpr std::size_t largest_hm2_answer = 1472;
 /// In lock-step, space 5, which no hardware uses, holds the board's time in ns (8 bytes, little-endian). A host
 /// advances the time by a write of all 8 bytes.
 /// Throws std::invalid_argument if an option is outside its range.
-[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const Hm2Options& options);
+[[nodiscard]] std::unique_ptr<UdpBoard> hm2_board(const BoardOptions& options);
 
 /// The node of docs/node.md: the core of its firmware, and the simulated rig behind its pins. Takes plant, start speed,
 /// MAC, address, lock-step and channels from `options`. A name that begins with "7I92" makes it present itself as that
 /// board. Throws std::invalid_argument as UdpBoard does.
-[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const Hm2Options& options);
+[[nodiscard]] std::unique_ptr<UdpBoard> node_board(const BoardOptions& options);
 
 /// A datagram to or from a host. `peer` stands for the host's address.
 struct Hm2Datagram {
@@ -119,21 +95,21 @@ class Hm2Link {
 
   /// Sets a fault such as "loss=5". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text) {
-    // In the order of Kind.
-    static constexpr std::array<FaultName, 10> names{{{"ok"},
-                                                      {"loss=PERCENT", 0, 100},
-                                                      {"lose-requests=N", 0, 1e6},
-                                                      {"lose-answers=N", 0, 1e6},
-                                                      {"delay=US", 0, 1e7},
-                                                      {"reorder"},
-                                                      {"duplicate"},
-                                                      {"stale"},
-                                                      {"short=BYTES", 0, 1472},
-                                                      {"garbage"}}};
-    const auto given = fault_in(text, names);
-    if (!given) refuse_fault(text, "one of " + usages_of(names, " "));
-    kind_ = static_cast<Kind>(given->place);
-    number_ = given->number;
+    static constexpr std::array<FaultName, 10> names{{
+        {"ok"},                       // heals all of them
+        {"loss=PERCENT", 0, 100},     // each datagram of both directions is lost with this probability
+        {"lose-requests=N", 0, 1e6},  // so many of the next ones are lost
+        {"lose-answers=N", 0, 1e6},
+        {"delay=US", 0, 1e7},      // every answer comes later
+        {"reorder"},               // answers leave in pairs, the later one first
+        {"duplicate"},             // every answer comes twice
+        {"stale"},                 // the answer before comes in place of each
+        {"short=BYTES", 0, 1472},  // answers end after so many bytes
+        {"garbage"},               // every answer is random bytes of its length
+    }};
+    const GivenFault given = fault_in(text, names);
+    fault_ = names[given.place].name();
+    number_ = given.number;
     kept_.reset();
   }
   /// Pulls or plugs the cable. What was under way is lost.
@@ -145,37 +121,26 @@ class Hm2Link {
   [[nodiscard]] bool plugged() const noexcept { return plugged_; }
 
   /// True if the board receives the next request.
-  [[nodiscard]] bool request_arrives() { return !lost(Kind::lose_requests); }
+  [[nodiscard]] bool request_arrives() { return !lost("lose-requests"); }
   /// Takes the board's answer.
   void send(Hm2Datagram answer, std::int64_t now_ns) {
-    if (lost(Kind::lose_answers)) return;
+    if (lost("lose-answers")) return;
     const auto leave = [this, now_ns](Hm2Datagram datagram) {
-      const auto later_ns = kind_ == Kind::delay ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
+      const auto later_ns = fault_ == "delay" ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
       waiting_.push_back({now_ns + later_ns, std::move(datagram)});
     };
-    switch (kind_) {
-      case Kind::reorder:
-        if (!kept_) {
-          kept_ = std::move(answer);
-          return;
-        }
-        leave(std::move(answer));
-        leave(*std::exchange(kept_, std::nullopt));
-        return;
-      case Kind::stale:
-        if (kept_) std::swap(*kept_, answer);
-        if (!kept_) kept_ = answer;
-        break;
-      case Kind::duplicate: leave(answer); break;
-      case Kind::too_short:
-        answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_)));
-        break;
-      case Kind::garbage:
-        for (std::uint8_t& byte : answer.bytes) byte = static_cast<std::uint8_t>(random_());
-        break;
-      default: break;
+    if (fault_ == "reorder" && !kept_) {
+      kept_ = std::move(answer);
+      return;
     }
+    if (fault_ == "stale" && kept_) std::swap(*kept_, answer);
+    if (fault_ == "stale" && !kept_) kept_ = answer;
+    if (fault_ == "duplicate") leave(answer);
+    if (fault_ == "short") answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_)));
+    if (fault_ == "garbage")
+      std::ranges::generate(answer.bytes, [this] { return static_cast<std::uint8_t>(random_()); });
     leave(std::move(answer));
+    if (fault_ == "reorder") leave(*std::exchange(kept_, std::nullopt));
   }
   /// The answers that reach their hosts by now.
   [[nodiscard]] std::vector<Hm2Datagram> take_due(std::int64_t now_ns) {
@@ -194,32 +159,20 @@ class Hm2Link {
   }
 
  private:
-  enum class Kind : std::uint8_t {
-    ok,             ///< heals all of them
-    loss,           ///< each datagram of both directions is lost with this probability
-    lose_requests,  ///< the next ones are lost, as many as the number says
-    lose_answers,
-    delay,      ///< every answer comes later
-    reorder,    ///< answers leave in pairs, the later one first
-    duplicate,  ///< every answer comes twice
-    stale,      ///< the answer before comes in place of each
-    too_short,  ///< answers end after so many bytes
-    garbage,    ///< every answer is random bytes of its length
-  };
   struct Waiting {
     std::int64_t due_ns{0};
     Hm2Datagram answer{};
   };
-  [[nodiscard]] bool lost(Kind counted) {
+  [[nodiscard]] bool lost(std::string_view counted) {
     if (!plugged_) return true;
-    if (kind_ == Kind::loss) return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
-    if (kind_ != counted || number_ < 1.0) return false;
+    if (fault_ == "loss") return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
+    if (fault_ != counted || number_ < 1.0) return false;
     number_ -= 1.0;
     return true;
   }
 
   bool plugged_{true};
-  Kind kind_{Kind::ok};
+  std::string_view fault_{"ok"};
   double number_{0.0};
   std::optional<Hm2Datagram> kept_{};
   std::vector<Waiting> waiting_{};

@@ -18,19 +18,6 @@
 
 namespace abs_hil::emulator {
 
-/// Properties of the emulated RT-DAC/USB2 and its wiring to the rig.
-struct UsbBoardOptions {
-  plant_sim::PlantOptions plant{};
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::uint16_t version{103};     ///< our choice: the real word is not public
-  std::uint32_t drive_pwm{0};     ///< PWM channel wired to the drive, 0 ... 9
-  std::uint32_t brake_pwm{1};
-  std::uint32_t lower_encoder{0};  ///< encoder channel of the lower wheel, 0 ... 7
-  std::uint32_t upper_encoder{1};
-  std::int32_t enable_line{-1};  ///< digital line that enables the drive, 0 ... 14; -1: none
-  bool shows_outputs{true};      ///< frames show the PWM and digital words that were sent; not known of the real board
-};
-
 /// The RT-DAC/USB2 with generic logic as a host sees it, frame by frame, and the simulated rig behind it. It was
 /// written only from the documented frames and does not use the driver's table. It has no watchdog: without a host the
 /// PWMs hold their duties.
@@ -40,8 +27,7 @@ class UsbBoardModel final : public RigBehind {
   using Image = std::array<std::uint8_t, frame_bytes>;
 
   /// Throws std::invalid_argument if an option is outside its range.
-  explicit UsbBoardModel(const UsbBoardOptions& options)
-      : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
+  explicit UsbBoardModel(const BoardOptions& options) : RigBehind(options) {
     check_channels("PWM", options.drive_pwm, options.brake_pwm, 10);
     check_channels("encoder", options.lower_encoder, options.upper_encoder, 8);
     if (options.enable_line > 14) {
@@ -132,7 +118,6 @@ class UsbBoardModel final : public RigBehind {
     return static_cast<double>(std::min<std::uint32_t>(written_[22 + 3 * channel], full)) / static_cast<double>(full);
   }
 
-  UsbBoardOptions options_;
   std::array<std::uint16_t, words> written_{};  ///< words after the last frame
   std::uint64_t frames_taken_{0};
   std::uint64_t nonsense_{0};

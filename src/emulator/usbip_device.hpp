@@ -124,24 +124,20 @@ class UsbipDevice {
     return value;
   }
 
-  static void append(Bytes& out, std::uint32_t value) {
-    for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<std::uint8_t>(value >> shift));
+  /// Appends a message: its first words, high bytes first, then zeros up to the header's end, and the data of a read.
+  static void append(Bytes& out, std::initializer_list<std::uint32_t> words, std::span<const std::uint8_t> data = {}) {
+    std::array<std::uint32_t, header_bytes / 4> header{};
+    std::ranges::copy(words, header.begin());
+    for (const std::uint32_t word : header) {
+      for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<std::uint8_t>(word >> shift));
+    }
+    out.insert(out.end(), data.begin(), data.end());
   }
-
-  static void append_header(Bytes& out, Command command, std::uint32_t sequence) {
-    append(out, command);
-    append(out, sequence);
-    for (int i = 0; i < 3; ++i) append(out, 0);  // device, direction and endpoint: the host knows them
-  }
-
   /// @param data data of a read; empty for a write, for which `length` tells the number of bytes taken
   static void reply(Bytes& out, std::uint32_t sequence, std::int32_t status, std::uint32_t length,
                     std::span<const std::uint8_t> data = {}) {
-    append_header(out, ret_submit, sequence);
-    append(out, static_cast<std::uint32_t>(status));
-    append(out, length);
-    for (int i = 0; i < 5; ++i) append(out, 0);  // start frame, packets, errors (only isochronous); padding
-    out.insert(out.end(), data.begin(), data.end());
+    // Device, direction and endpoint are 0: the host knows them.
+    append(out, {ret_submit, sequence, 0, 0, 0, static_cast<std::uint32_t>(status), length}, data);
   }
 
   static Bytes text_descriptor(const std::string& text) {
@@ -185,13 +181,10 @@ class UsbipDevice {
     }
   }
   void unlink(std::uint32_t sequence, std::uint32_t unlinked, Bytes& replies) {
-    const auto found =
-        std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.sequence == unlinked; });
+    const auto found = std::ranges::find(waiting_, unlinked, &Waiting::sequence);
     const bool was_waiting = found != waiting_.end();
     if (was_waiting) waiting_.erase(found);
-    append_header(replies, ret_unlink, sequence);
-    append(replies, static_cast<std::uint32_t>(was_waiting ? status_unlinked : 0));
-    for (int i = 0; i < 6; ++i) append(replies, 0);
+    append(replies, {ret_unlink, sequence, 0, 0, 0, static_cast<std::uint32_t>(was_waiting ? status_unlinked : 0)});
   }
   void control(const Transfer& t, Bytes& replies) {
     const std::uint8_t kind = t.setup[0];

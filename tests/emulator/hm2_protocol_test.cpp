@@ -92,7 +92,7 @@ TEST_CASE("Another word of its description is what the board says, and nothing e
   CHECK(std::inner_product(told.begin(), told.end(), changed.begin(), 0, std::plus<>(), std::not_equal_to<>()) == 1);
   CHECK(ask(*other, "81425804") == Bytes{0x04, 0x02, 0x01, 0x01});
   CHECK_THROWS_WITH(hm2_board({.name = ""}), Contains("1 to 16 characters"));
-  CHECK_THROWS_WITH(hm2_board({.enable_pin = 34}), Contains("-1 to 33"));
+  CHECK_THROWS_WITH(hm2_board({.enable_line = 34}), Contains("-1 to 33"));
 }
 
 TEST_CASE("Any datagram is answered within a packet, and two boards answer the same") {

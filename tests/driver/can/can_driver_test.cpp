@@ -54,7 +54,7 @@ driver::can::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFac
 
 TEST_CASE("Counts continue across the wrap of the node's counters") {
   constexpr std::int32_t per_rev = 1'000'000;  // the 24 bits wrap in 0.6 s
-  emulator::CanNodeOptions options{.start_speed_rad_s = 170.0};
+  emulator::BoardOptions options{.start_speed_rad_s = 170.0};
   options.plant.rig.encoder_counts_per_rev = per_rev;
   for (const bool fd : {false, true}) {
     NodeOnSocket node(options);

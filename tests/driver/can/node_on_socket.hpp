@@ -21,7 +21,7 @@ namespace abs_hil::test {
 /// The emulated node in lock-step at the other end of a socket pair.
 class NodeOnSocket {
  public:
-  explicit NodeOnSocket(emulator::CanNodeOptions options) : node_(in_lock_step(std::move(options))) {
+  explicit NodeOnSocket(emulator::BoardOptions options) : node_(in_lock_step(std::move(options))) {
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_.data()) != 0) std::abort();
   }
   NodeOnSocket(const NodeOnSocket&) = delete;
@@ -90,7 +90,7 @@ class NodeOnSocket {
   static driver::can::Link link(std::unique_ptr<driver::can::FrameSocket> socket, bool can_fd) {
     return {.socket = std::move(socket), .place = "socket pair", .can_fd = can_fd};
   }
-  static emulator::CanNodeOptions in_lock_step(emulator::CanNodeOptions options) {
+  static emulator::BoardOptions in_lock_step(emulator::BoardOptions options) {
     options.lock_step = true;
     return options;
   }

@@ -26,7 +26,7 @@ class RegisterBoard final : public emulator::RigBehind {
   using Bytes = std::vector<std::uint8_t>;
 
   explicit RegisterBoard(double start_speed_rad_s = 0.0, const plant_sim::PlantOptions& plant = {})
-      : RigBehind(plant, start_speed_rad_s) {
+      : RigBehind({.plant = plant, .start_speed_rad_s = start_speed_rad_s}) {
     const std::array<std::uint32_t, 16> idrom{
         3, 64, 512, text("MESA"), text("7I92"), 9, 34, 2, 34, 17, 100'000'000, 200'000'000, 4, 64, 256, 4};
     rom[0x100] = 0x55AACAFE;

@@ -22,7 +22,7 @@ struct RegisterAccess {
 
 /// The emulated card in this process: no files, no clock but the driver's.
 struct ModelCard {
-  explicit ModelCard(const emulator::CardOptions& options = {}) : model(options), faulty(model, 1) {}
+  explicit ModelCard(const emulator::BoardOptions& options = {}) : model(options), faulty(model, 1) {}
 
   /// Opens the card for the driver; the model must outlive it.
   [[nodiscard]] driver::pci::OpenCard opener();

@@ -27,7 +27,7 @@ std::string configure_refusal(RigDriver& driver) {
 }
 
 struct Running {
-  explicit Running(const emulator::CardOptions& options = {})
+  explicit Running(const emulator::BoardOptions& options = {})
       : card(options), own(pci::pci_driver({}, card.opener())), driver(*own) {
     driver.configure();
     driver.activate(0);

@@ -14,7 +14,7 @@ namespace abs_hil::test {
 
 /// The emulated USB board in this process: no bus, no clock but the driver's.
 struct ModelBoard {
-  explicit ModelBoard(const emulator::UsbBoardOptions& options = {}) : model(options) {}
+  explicit ModelBoard(const emulator::BoardOptions& options = {}) : model(options) {}
 
   /// Opens the board for the driver; the model must outlive it.
   [[nodiscard]] driver::usb::OpenBoard opener();

@@ -13,7 +13,7 @@ namespace {
 
 /// A board that an owner has left with drive and brake on.
 struct Left {
-  explicit Left(const usb::UsbOptions& options = {}, const emulator::UsbBoardOptions& board_options = {})
+  explicit Left(const usb::UsbOptions& options = {}, const emulator::BoardOptions& board_options = {})
       : board(board_options), writer(usb::safe_state_writer(options, board.opener())) {
     const auto own_owner = usb::usb_driver(options, board.opener());
     driver::RigDriver& owner = *own_owner;
