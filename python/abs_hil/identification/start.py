@@ -37,6 +37,8 @@ START_SD = 0.5
 DOUBT = 10.0
 #: after a braking, so long a wheel rolls freely, s
 RESTS_S = 0.3
+#: radii are measured to this share
+RADIUS = 0.02
 #: the tyre's parameters are within a factor of exp of this
 FARTHEST = 4.6
 
@@ -82,18 +84,19 @@ def first_values(problem: Problem, start: Mapping[str, float], other_form: Mappi
     here, too."""
     pieces = _pieces(problem)
     value = {p.key: float(start[p.key]) for p in problem.form.parameters} | problem.fixed
+    rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
+    # After a locked wheel, rolling takes its time.
+    free = [rolls & ~_braked(pieces, problem.logs, rest_s) for rest_s in (1.0, RESTS_S)]
+    rolling = free[0] if free[0].sum() > 3 else free[1]
+    unrolled = rolling.sum() <= 3
     if other_form is None:
-        rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
-        for rest_s in (1.0, RESTS_S):  # after a locked wheel, rolling takes its time
-            rolling = rolls & ~_braked(pieces, problem.logs, rest_s)
-            if rolling.sum() > 3 and 'r1_m' not in problem.fixed:
-                value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
-                break
+        if not unrolled and 'r1_m' not in problem.fixed:
+            value['r1_m'] = problem.given['r2_m'] * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
         value.update(_scanned_brake(value, pieces, problem, worth_dead))
         value.update({p.key: float(np.clip(value[p.key], p.least, p.most)) for p in problem.form.parameters} | problem.fixed)
     else:
         value.update({key: number for key, number in other_form.items() if key in value or key == DEAD_TIME.key})
-    _tyre(value, pieces, problem)
+    _tyre(value, pieces, problem, unrolled)
     return value
 
 
@@ -236,10 +239,12 @@ def _robust(A: np.ndarray, y: np.ndarray, pull: np.ndarray,
     return found, float(np.sum(np.minimum(residual**2, limit * residual))), triangle, left.T @ target
 
 
-def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
-    """Fits the tyre's parameters to the mean force of each interval, as the lower wheel felt it."""
+def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem, unrolled: bool) -> None:
+    """Fits the tyre's parameters to the mean force of each interval, as the lower wheel felt it; the upper wheel's radius, too,
+    if the wheels never rolled freely: it shifts every slip."""
     form, base, r2, J2 = problem.form, problem.base, problem.given['r2_m'], problem.given['J2_kg_m2']
-    tyre = [p for p in form.parameters if p.acts == 'contact' and p.key != 'r1_m' and p.key not in problem.fixed]
+    tyre = [p for p in form.parameters
+            if p.acts == 'contact' and (unrolled or p.key != 'r1_m') and p.key not in problem.fixed]
     contact = ~pieces.apart
     if not tyre or contact.sum() < 10:
         return
@@ -256,10 +261,11 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem) -> None:
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
     keys, least, most = zip(*((p.key, p.least, p.most) for p in tyre))
     begun = np.array([value[key] for key in keys])
+    size = np.where(np.equal(keys, 'r1_m'), RADIUS, 1.0)
     line = np.less(least, 0.0)  # those that may be negative move along a straight line, the others by factors
 
     def from_x(x: np.ndarray) -> list[float]:
-        return np.clip(np.where(line, begun + 0.1 * x, begun * np.exp(np.where(line, 0.0, x))), least, most).tolist()
+        return np.clip(np.where(line, begun + 0.1 * x, begun * np.exp(np.where(line, 0.0, size * x))), least, most).tolist()
 
     def residual(x: np.ndarray) -> np.ndarray:
         try:
