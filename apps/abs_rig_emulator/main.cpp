@@ -97,8 +97,7 @@ void add_options(cli::Parser& parser, EmulatorOptions& a) {
   parser.add("--watchdog-ms", &a.board.watchdog_ms,
              "watchdog of the CAN node, ms, until an activation sets another value",
              {.range = {1, 10'000}, .show_default = true});
-  shown(parser, "--bdf", &a.bdfs,
-        "the card's address; give it again for more cards, without a rig behind them");
+  shown(parser, "--bdf", &a.bdfs, "the card's address; give it again for more cards, without a rig behind them");
   shown(parser, "--plant", &a.plant, "plant by name or TOML file");
   parser.add("--set", &a.assignments, "any plant value, for example plant.theta_N=30", {.repeated = true});
   shown(parser, "--seed", &a.seed, "seed of intermittent faults and garbage");
@@ -121,7 +120,8 @@ void add_options(cli::Parser& parser, EmulatorOptions& a) {
   add_usb_options(parser, a);
   add_hm2_options(parser, a);
   std::string footer = "Control commands (--command, --control) ";
-  for (const BoardKind& kind : {program::card_kind(), program::can_node_kind(), program::usb_kind(), program::hm2_kind()})
+  for (const BoardKind& kind :
+       {program::card_kind(), program::can_node_kind(), program::usb_kind(), program::hm2_kind()})
     footer += fmt::format("of {}:\n{}", kind.name, kind.commands);
   parser.set_footer(footer);
 }

@@ -21,9 +21,9 @@ namespace abs_hil::emulator {
 /// Words of a board's description by their addresses.
 using Hm2Words = std::vector<std::pair<std::uint16_t, std::uint32_t>>;
 
-/// Properties of the emulated boards, their limits and their wiring to the rig. Where the makers' sources give no value,
-/// this project chose the default ("our choice"). Where they are silent or disagree, an option selects the variant, so
-/// that tests cover both.
+/// Properties of the emulated boards, their limits and their wiring to the rig. Where the makers' sources give no
+/// value, this project chose the default ("our choice"). Where they are silent or disagree, an option selects the
+/// variant, so that tests cover both.
 struct BoardOptions {
   plant_sim::PlantOptions plant{};
   double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0

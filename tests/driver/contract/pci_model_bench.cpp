@@ -21,7 +21,7 @@ class PciModelBench final : public Bench {
         std::count_if(card_.traffic.begin(), card_.traffic.end(), [](const auto& access) { return access.is_write; }));
   }
   bool break_brake_output() override {
-    card_.faulty.set(driver::pci::reg::pwm_width, {.kind = emulator::FaultKind::wrong, .parameter = 1});
+    card_.faulty.set("6c:wrong=1");
     // The drive's width is off by one too: its read-back fails first, and both outputs are still made safe.
     return true;
   }

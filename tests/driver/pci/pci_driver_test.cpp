@@ -147,7 +147,7 @@ TEST_CASE("Counters wrap around at 32 bit, with either sign") {
     // The register 50 counts before and after the wrap, seen through a register that reads too much.
     rig::Measurement before;
     rig::Measurement after;
-    card.faulty.set(0x88, {.kind = emulator::FaultKind::wrong, .parameter = 2147483598.0});
+    card.faulty.set("88:wrong=2147483598");
     // A jump of 2^31 - 50 counts is no speed a wheel can have: allowed here to get near the wrap.
     CHECK(driver.read(ms, before).error == IoError::implausible_answer);
     REQUIRE(driver.read(2 * ms, before).ok());
