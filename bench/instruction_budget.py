@@ -27,7 +27,7 @@ BUDGETS = [
     # These two together cost 389 until the checks judged the uncertainty of the stamps and told when they could not.
     # They may grow by 15 % over that, to 447, and by 9 for the overspeed that the counts alone show.
     ('plausibility of the measurement', ['counted_watch'], 315),
-    ('gate: check of the command', ['abs_hil::runtime::CommandGate::check(*'], 144),
+    ('gate: check of the command', ['abs_hil::runtime::CommandGate::check(*'], 141),
     ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 430),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),

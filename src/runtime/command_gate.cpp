@@ -2,7 +2,6 @@
 #include "runtime/command_gate.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "runtime/cycle_statistics.hpp"
@@ -13,16 +12,23 @@ namespace {
 
 using rig::Reason;
 
-static_assert(GATE_BRAKE_BY_PHASE == static_cast<int>(GateAction::brake_blocked_by_phase));
-static_assert(GATE_MOTOR_BY_BRAKE == static_cast<int>(GateAction::motor_blocked_by_brake));
-static_assert(GATE_MOTOR_RATE == static_cast<int>(GateAction::motor_rate_limited));
-static_assert(GATE_REFUSED == static_cast<int>(GateAction::refused));
+bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
+
+void stop_motor(rig::Command& command) noexcept {
+  command.motor_duty = 0.0;
+  command.motor_enable = false;
+}
 
 }  // namespace
 
 double CommandGate::unjudged_share() const noexcept {
   const auto watched_ns = static_cast<double>(watched_ns_.load(std::memory_order_relaxed));
   return watched_ns > 0.0 ? static_cast<double>(unjudged_ns_.load(std::memory_order_relaxed)) / watched_ns : 0.0;
+}
+
+void CommandGate::note(GateAction action) noexcept {
+  last_action_ = action;
+  add_as_single_writer(counts_[static_cast<std::size_t>(action)], std::uint64_t{1});
 }
 
 rig::GateCounts CommandGate::counts() const noexcept {
@@ -90,36 +96,96 @@ void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpe
   }
 }
 
-/// Flattened (all calls inlined): the calls would cost a tenth of its time in each cycle.
-[[gnu::flatten]] GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
-  require_finite(wanted, input.speeds);
-  // Member by member: a cast of the whole would go through memory.
-  const PhasePermission& may = permissions_[static_cast<std::size_t>(input.phase)];
-  const gate_wish wish{.command = {wanted.motor_duty, wanted.brake_duty, wanted.motor_enable, wanted.brake_torque_Nm},
-                       .may = {may.motor, may.brake, may.together},
-                       .faulty = fault() != Reason::none,
-                       .brake_barred = brake_barred_by() != Reason::none,
-                       .now_ns = input.now_ns};
-  gate_deeds deeds{};
-  const gate_command sent = gate_decide(&limits_, &state_, &wish, &deeds);
-  sent_ = {sent.motor_duty, sent.brake_duty, sent.motor_enable, sent.brake_torque_Nm};
-  const auto count = [this](unsigned action) { add_as_single_writer(counts_[action], std::uint64_t{1}); };
-  if (deeds.bits == 0) {
-    count(GATE_PASSED);
-  } else {
-    for (unsigned left = deeds.bits; left != 0; left &= left - 1) count(static_cast<unsigned>(std::countr_zero(left)));
-  }
-  return {.command = sent_, .action = static_cast<GateAction>(deeds.last)};
+double CommandGate::limited(double duty, double most, double sendable, GateAction action) noexcept {
+  const double within = std::clamp(duty, 0.0, most);
+  if (within != duty) note(action);
+  return std::min(within, sendable);
 }
 
-/// It is a fault if the driver names a duty outside 0 to 1: what acts is then unknown.
+double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
+                           GateAction action) noexcept {
+  const double most = before + rate_per_s * std::max(0.0, elapsed_s);  // a clock that goes back gives no time
+  if (duty <= most + rise_rounding) return duty;
+  note(action);
+  return most;
+}
+
+/// The command that may follow a fault: the motor is off, and the brake holds at most `fault_brake_duty`, if no fault
+/// bars it and the logic wants it.
+rig::Command CommandGate::after_fault(const rig::Command& wanted, std::int64_t now_ns) noexcept {
+  if (fault_ns_ < 0) fault_ns_ = now_ns;
+  const double held_s = static_cast<double>(now_ns - fault_ns_) * rig::s_per_ns;
+  const double duty = std::min(wanted.brake_duty, options_.fault_brake_duty);
+  const bool holds = duty > 0.0 && std::isfinite(wanted.brake_torque_Nm);  // false for NaN
+  if (!holds || brake_barred_by() != Reason::none || held_s > options_.fault_brake_limit_s) return {};
+  return {.brake_duty = duty, .brake_torque_Nm = wanted.brake_torque_Nm * (duty / wanted.brake_duty)};
+}
+
+void CommandGate::interlock(rig::Command& command, const PhasePermission& may) noexcept {
+  if (command.motor_duty > 0.0 && !command.motor_enable) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_disable);
+  }
+  if (command.motor_duty > 0.0 && !may.motor) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_phase);
+  }
+  if (brakes(command) && !may.brake) {
+    command.brake_duty = 0.0;
+    command.brake_torque_Nm = 0.0;
+    note(GateAction::brake_blocked_by_phase);
+  }
+  if (command.motor_duty > 0.0 && brakes(command) && !may.together) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_brake);
+  }
+}
+
+/// Flattened (all calls inlined): the calls would cost a tenth of its time in each cycle.
+[[gnu::flatten]] GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
+  last_action_ = GateAction::passed;
+  require_finite(wanted, input.speeds);
+  GateResult result;
+  const bool faulty = fault() != Reason::none;
+  rig::Command& command = result.command;
+  command = faulty ? after_fault(wanted, input.now_ns) : wanted;
+  if (!faulty || rig::acts(command)) {
+    command.brake_torque_Nm = std::max(0.0, command.brake_torque_Nm);
+    command.brake_duty =
+        limited(command.brake_duty, options_.brake_duty_max, sendable_.brake, GateAction::brake_clamped);
+    command.motor_duty =
+        limited(command.motor_duty, options_.motor_duty_max, sendable_.motor, GateAction::motor_clamped);
+    // The first command is not rate-limited: the outputs have been 0 for longer than any rise takes.
+    if (has_sent_) {
+      const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;
+      command.brake_duty = rising(command.brake_duty, std::max(brake_risen_, brake_free_duty_),
+                                  options_.brake_rate_per_s, elapsed_s, GateAction::brake_rate_limited);
+      command.motor_duty = rising(command.motor_duty, motor_risen_, options_.motor_rate_per_s, elapsed_s,
+                                  GateAction::motor_rate_limited);
+    }
+    interlock(command, permissions_[static_cast<std::size_t>(input.phase)]);
+    if (!faulty && last_action_ == GateAction::passed) note(GateAction::passed);
+  }
+  if (faulty) note(GateAction::refused);
+  sent_ = result.command;
+  brake_risen_ = result.command.brake_duty;
+  motor_risen_ = result.command.motor_duty;
+  sent_ns_ = input.now_ns;
+  has_sent_ = true;
+  result.action = last_action_;
+  return result;
+}
+
+/// A rise goes on from the unrounded duty: steps of the PWM must not swallow a slow one. If the driver sent much less,
+/// the rise goes on from that. It is a fault if the driver names a duty outside 0 to 1: what acts is then unknown.
 void CommandGate::note_sent(const rig::Command& sent) noexcept {
   for (const double duty : {sent.motor_duty, sent.brake_duty}) {
     if (duty >= 0.0 && duty <= 1.0) continue;  // false for NaN
     latch(Reason::driver_write_failed, duty);
     return;
   }
-  gate_note_sent(&state_, sent.motor_duty, sent.brake_duty);
+  brake_risen_ = std::min(brake_risen_, sent.brake_duty + rounded_down_most);
+  motor_risen_ = std::min(motor_risen_, sent.motor_duty + rounded_down_most);
   sent_ = sent;
 }
 

@@ -12,7 +12,6 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "rig/gate_counts.hpp"
 #include "runtime/encoder_check.hpp"
-#include "runtime/gate_core.h"
 #include "runtime/gate_options.hpp"
 #include "runtime/plausibility_limits.hpp"
 #include "runtime/response_check.hpp"
@@ -23,6 +22,12 @@ namespace abs_hil::runtime {
 
 using rig::gate_action_count;
 using rig::GateAction;
+
+/// A driver may round a duty down by so much: half a step of 8 bits, the coarsest PWM.
+inline constexpr double rounded_down_most = 0.5 / 255.0;
+
+/// Tolerance for rounding: a step exactly at the limit must pass.
+inline constexpr double rise_rounding = 1e-9;
 
 /// The largest duties that the driver can send.
 struct SendableDuties {
@@ -57,17 +62,10 @@ class CommandGate : public RunLatch {
                        const PlausibilityLimits& limits = {}, double brake_free_duty = 0.0,
                        const SendableDuties& sendable = {})
       : options_(options),
+        sendable_(sendable),
         judge_within_ns_(static_cast<std::int64_t>(options.judge_within_s * static_cast<double>(rig::ns_per_s))),
         permissions_(permissions),
-        limits_{.motor_duty_max = options.motor_duty_max,
-                .brake_duty_max = options.brake_duty_max,
-                .motor_sendable = sendable.motor,
-                .brake_sendable = sendable.brake,
-                .motor_rate_per_s = options.motor_rate_per_s,
-                .brake_rate_per_s = options.brake_rate_per_s,
-                .brake_free_duty = brake_free_duty,
-                .fault_brake_duty = options.fault_brake_duty,
-                .fault_brake_limit_s = options.fault_brake_limit_s},
+        brake_free_duty_(brake_free_duty),
         checks_wheels_(limits.enabled),
         speed_windows_(limits),
         encoders_(limits),
@@ -108,23 +106,35 @@ class CommandGate : public RunLatch {
   /// Latches a fault when the checks of the wheels have given no verdict for `judge_within_s` while an output was on.
   void require_verdict(std::int64_t now_ns) noexcept;
   void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
+  [[nodiscard]] double limited(double duty, double most, double sendable, GateAction action) noexcept;
+  [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
+                              GateAction action) noexcept;
+  [[nodiscard]] rig::Command after_fault(const rig::Command& wanted, std::int64_t now_ns) noexcept;
+  void interlock(rig::Command& command, const PhasePermission& may) noexcept;
+  void note(GateAction action) noexcept;
 
   GateOptions options_;
+  SendableDuties sendable_;
   std::int64_t judge_within_ns_;
   PhasePermissions permissions_;
-  gate_limits limits_;
+  double brake_free_duty_;
   bool checks_wheels_;
   SpeedWindows speed_windows_;
   EncoderCheck encoders_;
   ResponseCheck response_;
   rig::Command sent_{};
-  gate_state state_{};
+  double motor_risen_{0.0};  ///< duties from which the next rise counts
+  double brake_risen_{0.0};
+  bool has_sent_{false};
+  std::int64_t sent_ns_{0};
   std::int64_t watched_until_ns_{-1};         ///< < 0: the wheels have not been checked yet
   std::int64_t without_verdict_ns_{0};        ///< with an output on, since the latest verdict
   std::atomic<std::int64_t> watched_ns_{0};   ///< only the cycle's thread writes these two
   std::atomic<std::int64_t> unjudged_ns_{0};  ///< the part of it in which a verdict was overdue
   bool supply_known_{false};
   bool temperature_known_{false};
+  GateAction last_action_{GateAction::passed};
+  std::int64_t fault_ns_{-1};  ///< the first command after the fault; < 0: none yet
   std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< only the cycle's thread adds
 };
 

@@ -76,7 +76,7 @@ struct LaneGate {
     const S within = rig::clamped(duty, S(0.0), brake_duty_max);
     const S most = rig::larger(brake_risen, brake_free_duty) + brake_rate_per_s * dt_s;
     // The first command is not rate-limited.
-    return rig::select(dt_s > 0.0 && !(within <= most + gate_rise_rounding), most, within);
+    return rig::select(dt_s > 0.0 && !(within <= most + runtime::rise_rounding), most, within);
   }
 };
 
@@ -209,7 +209,7 @@ struct BrakingCourse {
     sample.torque_ref_Nm = target.torque_Nm;
     const S passed = gate.passed_duty(target.duty, dt_s);
     duty = rig.sent_duty(passed);
-    gate.brake_risen = rig::smaller(passed, S(duty + gate_rounded_down_most));
+    gate.brake_risen = rig::smaller(passed, S(duty + runtime::rounded_down_most));
     actuator.command(duty, target.torque_Nm);
     sent_Nm = actuator.static_torque_Nm(duty, target.torque_Nm);
     unsent_Nm = rig::select(braking, actuator.unsent_Nm(wanted_Nm, target.torque_Nm, sent_Nm), S(0.0));
