@@ -148,12 +148,6 @@ class Planner {
   KeyTable keys_;
 };
 
-double highest(const experiment::Profile& profile) {
-  double most = 0.0;
-  for (const experiment::Profile::Point& point : profile.points()) most = std::max(most, point.value);
-  return most;
-}
-
 /// What a condition alone tells of the run when it holds; 0: nothing.
 using Reached = std::function<double(const experiment::EndCondition&)>;
 
@@ -172,6 +166,12 @@ double reached_in(const experiment::PhasePlan& phase, const Reached& reached) {
 }
 
 }  // namespace
+
+double highest(const experiment::Profile& profile) {
+  double most = 0.0;
+  for (const experiment::Profile::Point& point : profile.points()) most = std::max(most, point.value);
+  return most;
+}
 
 bool means_to_stop(const Plan& plan, double end_speed_m_s) {
   const auto& phases = plan.phases;

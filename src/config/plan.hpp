@@ -31,6 +31,9 @@ void apply(const Script& script, config::Settings& settings);
 /// standstill or below a car speed of at most `end_speed_m_s`.
 [[nodiscard]] bool means_to_stop(const Plan& plan, double end_speed_m_s);
 
+/// The profile's largest value, 0 at least.
+[[nodiscard]] double highest(const experiment::Profile& profile);
+
 /// Describes where the script exceeds the duties and torques of rig, gate or board under these settings; empty:
 /// nowhere. A run stays within them.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& settings);

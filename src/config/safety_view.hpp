@@ -11,20 +11,14 @@ namespace abs_hil::config {
 
 /// All that a run could do to a board, folded into one list: the keys that have a bound, wherever their values came
 /// from, and what the plan's phases do, whose numbers stand in an experiment's file. A number of a phase has the bound
-/// of the key that shipped experiments take it from, and a person consents to both by that key. One rule judges all
-/// rows.
+/// of the key that shipped experiments take it from, and a person consents to both by that key. One rule judges all.
 struct SafetyRow {
-  enum class Verdict : std::uint8_t {
-    told,      ///< a fact without a bound
-    holds,     ///< within its bound
-    weak,      ///< weakens the protection of a board
-    accepted,  ///< weakens it, and a person has consented by `unsafe.`
-  };
-  std::string what{};     ///< the key, or what a phase does
-  std::string value{};    ///< with its unit
-  std::string bound{};    ///< in words, with what the key means; empty: none
-  std::string key{};      ///< whose bound it is
-  std::string consent{};  ///< the flag below `unsafe.` that consents, too; empty: only `unsafe.keys` does
+  /// Accepted: weak, with a person's consent.
+  enum class Verdict : std::uint8_t { told, holds, weak, accepted };
+  std::string what{};   ///< the key, or what a phase does
+  std::string value{};  ///< with its unit
+  std::string bound{};  ///< in words, with what the key means; empty: none
+  std::string fix{};    ///< the option that consents
   Verdict verdict{Verdict::told};
 };
 using SafetyView = std::vector<SafetyRow>;

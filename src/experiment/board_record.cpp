@@ -21,8 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Format 1 had no checksum.
-constexpr int record_format = 2;
+constexpr int record_format = 2;  // 1 had no checksum
 
 /// The values of all options, as text.
 template <class Options>

@@ -60,13 +60,11 @@ struct BoardRecord {
 /// its path. Throws driver::Unavailable.
 std::filesystem::path write_record(const BoardRecord& record, const std::vector<std::filesystem::path>& folders);
 
-/// Why the present board and options have no record that holds; empty if they have. The first folder with a record of
-/// this board decides, so that a user's own does not replace the machine's.
+/// Why no record holds; empty if one does. The first folder with a record of the board decides.
 [[nodiscard]] std::string why_not_commissioned(const BoardRecord& present,
                                                const std::vector<std::filesystem::path>& folders);
 
-/// Throws driver::Unavailable, with the command to type, unless the board has a record that holds, in the options'
-/// folders.
+/// Throws driver::Unavailable, with the command to type, unless a record holds.
 void require_record(const driver::DriverOptions& options, const RigIdentity& identity,
                     const driver::BoardIdentity& board);
 

@@ -20,27 +20,23 @@ namespace abs_hil::program {
 
 namespace {
 
-/// Prints what the run may do on a board. Throws std::invalid_argument if a part of it, or of a run of its series,
-/// needs a person's consent.
-void show_safety(const config::Sources& sources) {
-  const config::SafetyView view = config::safety_view(sources);
-  cli::print("{}\n", config::in_words(view));
-  static_cast<void>(config::refuse_weak_rows(view));
-  const config::Configuration merged = config::merge(sources);
-  if (!merged.script->series.given || sources.one_of_series) return;
-  for (const config::SeriesMember& member : config::members_of(*merged.script, merged.settings.seed)) {
-    config::Sources one = sources;
-    config::choose(member, one);
-    static_cast<void>(config::refuse_weak_rows(config::safety_view(one)));
-  }
-}
-
-/// @param safety  say first what the run may do on a board
+/// @param safety  say first what the run may do on a board; refuse what needs a person's consent, in its series, too
 int validate(const config::Sources& sources, bool safety) {
-  if (safety) show_safety(sources);
+  if (safety) {
+    const config::SafetyView view = config::safety_view(sources);
+    cli::print("{}\n", config::in_words(view));
+    static_cast<void>(config::refuse_weak_rows(view));
+  }
   const config::Configuration merged = config::merge(sources);
   const config::Script& script = *merged.script;
   const config::Settings& s = merged.settings;
+  if (safety && script.series.given) {
+    for (const config::SeriesMember& member : config::members_of(script, s.seed)) {
+      config::Sources one = sources;
+      config::choose(member, one);
+      static_cast<void>(config::refuse_weak_rows(config::safety_view(one)));
+    }
+  }
   cli::print("{}", config::explain(script, s));
   if (!script.series.experiments.empty()) {
     int status = exit_completed;

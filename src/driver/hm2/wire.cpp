@@ -3,13 +3,11 @@
 #include "driver/hm2/wire.hpp"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <stdexcept>
 
 #include "abs_hil/rig/time_units.hpp"

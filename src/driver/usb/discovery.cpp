@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <system_error>
 
-#include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/sysfs.hpp"
 #include "driver/usb/wire.hpp"
