@@ -1,0 +1,42 @@
+// A pool of threads for one loop. It keeps the failure of the lowest index, so that errors do not depend on threads.
+#include "study/parallel.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace abs_hil::study {
+
+std::size_t machine_threads() noexcept { return std::max(1U, std::thread::hardware_concurrency()); }
+
+void for_each_index(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task) {
+  std::atomic<std::size_t> next{0};
+  std::mutex failure_mutex;
+  std::exception_ptr failure;
+  std::size_t failed_index = count;
+  const auto work = [&] {
+    for (std::size_t index = next.fetch_add(1); index < count; index = next.fetch_add(1)) {
+      try {
+        task(index);
+      } catch (...) {
+        const std::scoped_lock lock(failure_mutex);
+        if (index < failed_index) {
+          failed_index = index;
+          failure = std::current_exception();
+        }
+        next.store(count);
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> pool;
+    for (std::size_t i = 1; i < std::min(threads, count); ++i) pool.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace abs_hil::study
