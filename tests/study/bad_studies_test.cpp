@@ -53,7 +53,7 @@ TEST_CASE("bad studies are refused with line and column") {
       {"[factors]\nplant.theta_N = [20,\n -1]", "3:2", {"plant.theta_N = -1", "(0, 100000]"}},
       {"[factors]\nplant.theta_N = [[1]]", "2:18", {"neither a number"}},
       {"[factors]\nplant.theta_N = { from = 20 }", "2:17", {"has no to"}},
-      {"[factors]\nplant.theta_N = { from = 20, to = 900 }", "2:17", {"plant.theta_N = 900"}},
+      {"[factors]\nplant.theta_N = { from = 20, to = 900000 }", "2:17", {"plant.theta_N = 900"}},
       {"[factors]\nplant.theta_N = { from = 20, to = 20 }", "2:17", {"both ends are 20"}},
       {"[factors]\nplant.theta_N = { from = 20, to = 30, step = 2 }", "2:39", {"unknown key \"step\"", "steps"}},
       {"[factors]\nplant.theta_N = { from = 20, to = 30, sd = 2 }", "2:19", {"leave from out"}},
