@@ -112,13 +112,7 @@ class World {
   ScriptedBoard board_{story_};
   Mail mail_{};
   ServicePage page_{};
-  BoardGuard guard_{{.clock = clock_,
-                     .board = board_,
-                     .processes = processes_,
-                     .timeout_ns = 20 * ms,
-                     .keep_ns = 5 * ms,
-                     .mail = &mail_,
-                     .page = &page_}};
+  BoardGuard guard_{resident_guard(clock_, board_, processes_, mail_, page_)};
   std::optional<Pages> pages_{};
   bool covered_{false}, cycles_{false}, writes_{false};
   std::uint64_t beats_{0};

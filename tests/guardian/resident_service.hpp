@@ -88,13 +88,7 @@ struct Service {
   std::function<void(std::int64_t)> happens;
   bool beats{false};
   int looks{0};
-  BoardGuard guard{{.clock = clock,
-                    .board = board,
-                    .processes = processes,
-                    .timeout_ns = 20 * ms,
-                    .keep_ns = 5 * ms,
-                    .mail = &mail,
-                    .page = &page}};
+  BoardGuard guard{resident_guard(clock, board, processes, mail, page)};
 };
 
 }  // namespace abs_hil::guardian::test

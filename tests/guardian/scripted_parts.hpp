@@ -132,4 +132,16 @@ class ScriptedBoard final : public driver::SafeStateWriter {
   Story& story_;
 };
 
+/// The resident service's guard over scripted parts: it waits 20 ms for a run, and looks every 5 ms.
+inline GuardParts resident_guard(ScriptedClock& clock, ScriptedBoard& board, ScriptedProcesses& processes, Mail& mail,
+                                 ServicePage& page) {
+  return {.clock = clock,
+          .board = board,
+          .processes = processes,
+          .timeout_ns = 20 * ms,
+          .keep_ns = 5 * ms,
+          .mail = &mail,
+          .page = &page};
+}
+
 }  // namespace abs_hil::guardian::test

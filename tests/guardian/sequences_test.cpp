@@ -226,13 +226,7 @@ class World {
   Mail mail_;
   ServicePage page_;
   SharedRecorder recorder_{1};
-  BoardGuard guard_{{.clock = clock_,
-                     .board = board_,
-                     .processes = processes_,
-                     .timeout_ns = 20 * ms,
-                     .keep_ns = 5 * ms,
-                     .mail = &mail_,
-                     .page = &page_}};
+  BoardGuard guard_{resident_guard(clock_, board_, processes_, mail_, page_)};
   driver::FileDescriptor listener_{-1};
   std::optional<Talker> talker_{};
   std::array<Client, clients> clients_{};
