@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
 tools=$PWD/build/proofs/tools
-root=$tools/root/usr
+usr=$tools/debian/usr
 programs=(cbmc goto-cc goto-instrument cadical)
 
 get_tools() {
@@ -23,10 +23,10 @@ get_tools() {
   apt=(apt-get -qq -o "Dir::Etc::sourcelist=$tools/apt/sources" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$tools/apt/lists"
     -o "Dir::State::status=$tools/apt/status" -o "Dir::Cache=$tools/apt" -o APT::Sandbox::User=)
   "${apt[@]}" update
-  (cd "$tools" && rm -rf ./*.deb root && "${apt[@]}" download "${packages[@]}" && printf '%s\0' ./*.deb | xargs -0 -I{} dpkg-deb -x {} root)
+  (cd "$tools" && rm -rf ./*.deb debian && "${apt[@]}" download "${packages[@]}" && printf '%s\0' ./*.deb | xargs -0 -I{} dpkg-deb -x {} debian)
   for program in "${programs[@]}"; do
-    printf '#!/bin/sh\nexec %s --library-path %s %s "$@"\n' "'$root/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2'" \
-      "'$root/lib/x86_64-linux-gnu:$root/lib'" "'$root/bin/$program'" >"$tools/bin/$program"
+    printf '#!/bin/sh\nexec %s --library-path %s %s "$@"\n' "'$usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2'" \
+      "'$usr/lib/x86_64-linux-gnu:$usr/lib'" "'$usr/bin/$program'" >"$tools/bin/$program"
     chmod +x "$tools/bin/$program"
     "$tools/bin/$program" --version >/dev/null
   done
