@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
 #include "abs_hil/rig/option_check.hpp"
@@ -71,6 +72,12 @@ SafetyView safety_view(const Settings& s, const KeyTable& keys, const Plan& plan
     if (kind < Kind::above || kind > Kind::text) continue;  // no value weakens, or another rule judges
     add(key.name, text_of(value_of(key)), key,
         std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target));
+  }
+  // The keys' ranges let a car in. Limits from such an identity would protect no rig of a laboratory.
+  for (const auto& [name, most] : {std::pair("rig.theta_N", 500.0), std::pair("rig.b1_Nm", 1000.0)}) {
+    Key key = *find_key(keys.keys(), name);
+    key.safety = rig::weaker_above(most);
+    add(key.name, text_of(value_of(key)), key, rig::weakens(key, number_of(value_of(key)).value_or(0.0)));
   }
   const auto tell = [&view](const std::string& what, double value, std::string_view unit) {
     view.push_back({.what = what, .value = with_unit(fmt::format("{:.6g}", value), unit)});

@@ -139,6 +139,15 @@ TEST_CASE("numbers of phases have the bounds of the keys that shipped experiment
   }
 }
 
+TEST_CASE("the identity of a car needs a consent: its limits would see nothing on a rig") {
+  for (const std::string key : {"rig.theta_N", "rig.b1_Nm"}) {
+    const std::string assignment = key + "=4000";
+    CHECK_THAT(refusal({.assignments = {assignment}}), Contains(key + " = 4000") && Contains("unsafe.keys=" + key));
+    CHECK(refusal({.assignments = {assignment}}, key).empty());
+    CHECK(refusal({.assignments = {key + "=400"}}).empty());
+  }
+}
+
 TEST_CASE("a run of a series is judged like one that a person asks for") {
   const Files files;
   const std::string text =
