@@ -64,19 +64,18 @@ def _lowered(fit: Fit, levels: Sequence[float]) -> float:
         return np.inf
 
 
-def are_of_a_board(fit: Fit) -> bool:
-    """True if the logs' own duties are those that some board gives."""
+def are_given_in(fit: Fit, steps: int) -> bool:
+    """True if the logs' own duties are those of a board with so many steps."""
     duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
-    return any(np.abs(duties * steps - np.rint(duties * steps)).max() < 1e-5 for steps in PWM_STEPS)
+    return bool(np.abs(duties * steps - np.rint(duties * steps)).max() < 1e-5)
 
 
 def with_steps(fit: Fit) -> Iterator[tuple[float, Fit]]:
     """The fit to duties as boards would have given them, which the logs hold as they were asked for, each with the level of
     disturbances that would take up what a step is: one that cannot follow there has other reasons. To be believed only if nothing
     but the counts' steps is left then: on a rig that the plant does not describe, any other duties may be likelier."""
-    duties = np.unique(np.concatenate([duty for log in fit.problem.logs for duty in (log.brake_pwm, log.motor_pwm)]))
     for steps in PWM_STEPS[::-1]:
-        if np.abs(duties * steps - np.rint(duties * steps)).max() >= 1e-5:
+        if not are_given_in(fit, steps):
             # A half rounds up, as on the board, whatever the last digit of the log's.
             logs = [dataclasses.replace(log, **{name: np.floor(getattr(log, name) * steps + 0.5 + 1e-6) / steps
                                                 for name in ('brake_pwm', 'motor_pwm')}) for log in fit.problem.logs]

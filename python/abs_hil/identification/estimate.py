@@ -173,7 +173,7 @@ def _quiet(fit: Fit) -> Fit | None:
             continue
         if left := _left_by(found):
             fit.problem.say(left)
-        elif choices.are_of_a_board(fit):
+        elif any(choices.are_given_in(fit, steps) for steps in choices.PWM_STEPS):
             return found
         elif best is None or found.cost.sum() < best.cost.sum():
             best = found
