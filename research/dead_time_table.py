@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 
+import abs_hil
 from abs_hil.optimum import optimum
 from abs_hil.options import settings_of
 
@@ -22,7 +23,7 @@ DEAD_S = 0.024
 PLANTS = (('paper-table1', 0.05), ('paper-timing', 0.05), ('inteco-manual', 0.2), ('measured-relay', 0.2), ('measured-step', 0.2))
 #: law, dead time that it is told over the true one
 SHOWN = (('adaptive-optimal', 1.0), ('adaptive-optimal', 0.7), ('adaptive-optimal', 1.3), ('adaptive-predictor', 1.0),
-         ('adaptive', 1.0))
+         ('adaptive', 1.0), ('locked', 1.0))
 START_RAD_S = 170.0
 
 
@@ -46,7 +47,7 @@ def main():
     for plant, _ in PLANTS:
         even = settings_of(['plant.brake_dead_time_s=0', 'plant.brake_release_lead_s=0'])
         found = optimum(plant, even, start_speed_rad_s=START_RAD_S, end_speed_m_s=0.3, knows_road=True)
-        bounds[plant] = found.distance_m + START_RAD_S * 0.0990 * DEAD_S
+        bounds[plant] = found.distance_m + START_RAD_S * abs_hil.keys(plant=plant)['plant.r2_m']['value'] * DEAD_S
     for law, told in SHOWN:
         cells = []
         for plant, slip in PLANTS:

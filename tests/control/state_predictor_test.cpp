@@ -33,7 +33,7 @@ State predicted(const rig::RigParameters& rig, const std::vector<double>& torque
 
 }  // namespace
 
-TEST_CASE("The predicted slip is that of a fine integration, and its error falls with the square of the parts") {
+TEST_CASE("The predicted slip is that of a fine integration, and its error falls with the length of the parts") {
   std::mt19937_64 random{7};
   const auto draw = [&](double least, double most) {
     return least + (most - least) * static_cast<double>(random() >> 11U) * 0x1p-53;
