@@ -28,7 +28,7 @@
 #include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
-#include "telemetry/csv_text.hpp"
+#include "telemetry/csv_sink.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/message_codec.hpp"
 

@@ -48,7 +48,7 @@ constexpr std::string_view allowed =
     "geteuid getgid getegid getgroups getresuid getresgid uname sysinfo getrusage getrlimit setrlimit getrandom "
     "seccomp";
 
-TrappedSystemCalls trapped;
+Offences trapped;
 int answers_to = -1;
 bool counting = false;
 
@@ -58,7 +58,7 @@ void on_trap(int /*signal*/, siginfo_t* info, void* context) {
     static_cast<void>(::send(answers_to, &refusal, sizeof refusal, MSG_NOSIGNAL));
     ::_exit(1);
   }
-  if (trapped.count++ == 0) trapped.first = info->si_syscall;
+  if (trapped.system_calls++ == 0) trapped.first_system_call = info->si_syscall;
 #if defined(__x86_64__)
   static_cast<ucontext_t*>(context)->uc_mcontext.gregs[REG_RAX] = -ENOSYS;
 #elif defined(__aarch64__)
@@ -247,6 +247,6 @@ bool trap_system_calls(int socket) {
   return filter.install();
 }
 
-TrappedSystemCalls trapped_system_calls() noexcept { return trapped; }
+Offences trapped_system_calls() noexcept { return trapped; }
 
 }  // namespace abs_hil::interchange

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 
+#include "interchange/foreign_code.hpp"
+
 namespace abs_hil::interchange {
 
 /// Limits of the process that runs foreign code in a simulation or a trial (docs/interchange.md has the table).
@@ -28,14 +30,10 @@ inline constexpr std::uint64_t host_threads_max = 256;                          
 /// Name of a system call; "another one" for a number that is none.
 [[nodiscard]] std::string name_of_call(std::int32_t number);
 
-struct TrappedSystemCalls {
-  std::uint64_t count{0};
-  std::int32_t first{-1};  ///< number of the first one
-};
-
 /// From now on this process may only send on `socket`, ask for memory, and end. Any other system call is counted and
 /// fails with ENOSYS. False if the kernel cannot do that.
 [[nodiscard]] bool trap_system_calls(int socket);
-[[nodiscard]] TrappedSystemCalls trapped_system_calls() noexcept;
+/// What was counted of them.
+[[nodiscard]] Offences trapped_system_calls() noexcept;
 
 }  // namespace abs_hil::interchange

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -64,99 +66,81 @@ struct Called {
   static constexpr unsigned wants_the_end = 1000;
 };
 
-/// A function of the FMU that returns a status.
-template <class Type>
-class Function {
- public:
-  Function(const LoadedLibrary& library, const char* name) : name_(name), function_(library.find<Type>(name)) {}
-  template <class... Arguments>
-  Called operator()(Arguments... arguments) const {
-    return {name_, static_cast<unsigned>(function_(arguments...))};
-  }
-
- private:
-  const char* name_;
-  Type* function_;
+/// A function of the FMU.
+struct Function {
+  Function(const LoadedLibrary& library, std::string name_of_it)
+      : name(std::move(name_of_it)), at(library.find<void>(name.c_str())) {}
+  std::string name;
+  void* at;
 };
 
 /// A variable with the function that sets or gets it.
-struct Port : FmuLink {
-  std::string name;
-  void* function;
-};
+struct Port : FmuLink, Function {};
 
-/// The functions of one version that a controller needs, beside those that set and get values.
-class Instance2 {
+/// What a controller needs of an instance, in the words of its FMI. A function that returns a status is called as one
+/// that returns a number: they are passed alike.
+class Instance {
  public:
-  Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
-    instance_.reset(instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), rig::file_uri(resources).c_str(),
-                                 &callbacks_, fmi2False, fmi2False));
+  Instance(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources)
+      : is_fmi3_(facts.fmi == 3),
+        enter_(library, name_of(facts, "EnterInitializationMode")),
+        exit_(library, name_of(facts, "ExitInitializationMode")),
+        reset_(library, name_of(facts, "Reset")),
+        step_(library, name_of(facts, "DoStep")),
+        instance_(nullptr, library.find<void(void*)>(name_of(facts, "FreeInstance").c_str())) {
+    if (is_fmi3_) {
+      const std::string path = resources + "/";
+      instance_.reset(library.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation")(
+          "controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False, fmi3False, nullptr, 0,
+          nullptr, log3, nullptr));
+    } else {
+      set_up_.emplace(library, "fmi2SetupExperiment");
+      instance_.reset(library.find<fmi2InstantiateTYPE>("fmi2Instantiate")(
+          "controller", fmi2CoSimulation, facts.token.c_str(), rig::file_uri(resources).c_str(), &callbacks_, fmi2False,
+          fmi2False));
+    }
+  }
+  [[nodiscard]] static std::string name_of(const FmuFacts& facts, std::string_view function) {
+    return fmt::format("fmi{}{}", facts.fmi, function);
   }
   [[nodiscard]] bool made() const { return instance_ != nullptr; }
   /// @param value  of the variable's type: all these functions differ in that alone
   [[nodiscard]] Called pass(const Port& port, void* value) const {
-    using Function2 = fmi2Status(void*, const std::uint32_t*, std::size_t, void*);
-    return {port.name.c_str(), static_cast<unsigned>(reinterpret_cast<Function2*>(port.function)(
-                                   instance_.get(), &port.reference, 1, value))};
+    constexpr std::size_t one = 1;
+    return is_fmi3_ ? call(port, &port.reference, one, value, one) : call(port, &port.reference, one, value);
   }
   [[nodiscard]] Called enter() const {
-    const Called called = set_up_(instance_.get(), fmi2False, 0.0, 0.0, fmi2False, 0.0);
-    return called.worked() ? enter_(instance_.get()) : called;
+    if (is_fmi3_) return call(enter_, fmi3False, 0.0, 0.0, fmi3False, 0.0);
+    const Called called = call(*set_up_, fmi2False, 0.0, 0.0, fmi2False, 0.0);
+    return called.worked() ? call(enter_) : called;
   }
-  [[nodiscard]] Called exit() const { return exit_(instance_.get()); }
-  [[nodiscard]] Called reset() const { return reset_(instance_.get()); }
+  [[nodiscard]] Called exit() const { return call(exit_); }
+  [[nodiscard]] Called reset() const { return call(reset_); }
   [[nodiscard]] Called step(double time_s, double step_s) const {
-    return step_(instance_.get(), time_s, step_s, fmi2True);
-  }
-
- private:
-  const LoadedLibrary& library_;
-  fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
-  fmi2InstantiateTYPE* instantiate_{library_.find<fmi2InstantiateTYPE>("fmi2Instantiate")};
-  Function<fmi2SetupExperimentTYPE> set_up_{library_, "fmi2SetupExperiment"};
-  Function<fmi2EnterInitializationModeTYPE> enter_{library_, "fmi2EnterInitializationMode"};
-  Function<fmi2ExitInitializationModeTYPE> exit_{library_, "fmi2ExitInitializationMode"};
-  Function<fmi2ResetTYPE> reset_{library_, "fmi2Reset"};
-  Function<fmi2DoStepTYPE> step_{library_, "fmi2DoStep"};
-  std::unique_ptr<void, fmi2FreeInstanceTYPE*> instance_{nullptr,
-                                                         library_.find<fmi2FreeInstanceTYPE>("fmi2FreeInstance")};
-};
-
-class Instance3 {
- public:
-  Instance3(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) : library_(library) {
-    const std::string path = resources + "/";
-    instance_.reset(instantiate_("controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False,
-                                 fmi3False, nullptr, 0, nullptr, log3, nullptr));
-  }
-  [[nodiscard]] bool made() const { return instance_ != nullptr; }
-  [[nodiscard]] Called pass(const Port& port, void* value) const {
-    using Function3 = fmi3Status(void*, const std::uint32_t*, std::size_t, void*, std::size_t);
-    return {port.name.c_str(), static_cast<unsigned>(reinterpret_cast<Function3*>(port.function)(
-                                   instance_.get(), &port.reference, 1, value, 1))};
-  }
-  [[nodiscard]] Called enter() const { return enter_(instance_.get(), fmi3False, 0.0, 0.0, fmi3False, 0.0); }
-  [[nodiscard]] Called exit() const { return exit_(instance_.get()); }
-  [[nodiscard]] Called reset() const { return reset_(instance_.get()); }
-  [[nodiscard]] Called step(double time_s, double step_s) const {
+    if (!is_fmi3_) return call(step_, time_s, step_s, fmi2True);
     fmi3Boolean event = fmi3False;
     fmi3Boolean terminate = fmi3False;
     fmi3Boolean early = fmi3False;
     fmi3Float64 last_s = 0.0;
-    const Called called = step_(instance_.get(), time_s, step_s, fmi3True, &event, &terminate, &early, &last_s);
+    const Called called = call(step_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s);
     return called.worked() && terminate ? Called{called.function, Called::wants_the_end} : called;
   }
 
  private:
-  const LoadedLibrary& library_;
-  fmi3InstantiateCoSimulationTYPE* instantiate_{
-      library_.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation")};
-  Function<fmi3EnterInitializationModeTYPE> enter_{library_, "fmi3EnterInitializationMode"};
-  Function<fmi3ExitInitializationModeTYPE> exit_{library_, "fmi3ExitInitializationMode"};
-  Function<fmi3ResetTYPE> reset_{library_, "fmi3Reset"};
-  Function<fmi3DoStepTYPE> step_{library_, "fmi3DoStep"};
-  std::unique_ptr<void, fmi3FreeInstanceTYPE*> instance_{nullptr,
-                                                         library_.find<fmi3FreeInstanceTYPE>("fmi3FreeInstance")};
+  template <class... Arguments>
+  [[nodiscard]] Called call(const Function& function, Arguments... arguments) const {
+    using Type = unsigned(void*, Arguments...);
+    return {function.name.c_str(), reinterpret_cast<Type*>(function.at)(instance_.get(), arguments...)};
+  }
+
+  bool is_fmi3_;
+  fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
+  std::optional<Function> set_up_{};  ///< of FMI 2
+  Function enter_;
+  Function exit_;
+  Function reset_;
+  Function step_;
+  std::unique_ptr<void, void (*)(void*)> instance_;
 };
 
 /// The value as a type of FMI has it: a flag is true but for 0, a whole number the nearest of its range, 0 for NaN.
@@ -176,15 +160,14 @@ Value value_as(double value) noexcept {
 
 /// The controller in an FMU. A step sets the inputs of this cycle, lets the FMU compute one period, and takes its
 /// outputs.
-template <class Instance>
 class FmuCode final : public ForeignCode {
  public:
   FmuCode(const ForeignSetup& setup, const FmuFacts& facts)
       : library_(facts.library, setup.file),
         instance_(library_, facts, (setup.folder / "resources").string()),
-        inputs_(ports(facts.inputs, facts.fmi, "Set")),
-        outputs_(ports(facts.outputs, facts.fmi, "Get")),
-        parameters_(ports(facts.parameters, facts.fmi, "Set")),
+        inputs_(ports(facts, facts.inputs, "Set")),
+        outputs_(ports(facts, facts.outputs, "Get")),
+        parameters_(ports(facts, facts.parameters, "Set")),
         period_s_(setup.period_s) {
     if (!instance_.made()) refuse(setup.file, "it cannot be instantiated; the line above says why, if the FMU did");
     begin();
@@ -214,12 +197,10 @@ class FmuCode final : public ForeignCode {
   }
 
  private:
-  std::vector<Port> ports(const std::vector<FmuLink>& links, int fmi, const char* deed) const {
+  std::vector<Port> ports(const FmuFacts& facts, const std::vector<FmuLink>& links, const std::string& deed) const {
     std::vector<Port> ports;
     for (const FmuLink& link : links) {
-      std::string name = fmt::format("fmi{}{}{}", fmi, deed, link.type.functions);
-      void* const function = library_.find<void>(name.c_str());
-      ports.push_back({link, std::move(name), function});
+      ports.push_back({link, {library_, Instance::name_of(facts, deed + std::string(link.type.functions))}});
     }
     return ports;
   }
@@ -272,9 +253,7 @@ class FmuCode final : public ForeignCode {
 }  // namespace
 
 std::unique_ptr<ForeignCode> load_fmu(const ForeignSetup& setup) {
-  const FmuFacts facts = facts_of(setup.file, setup.folder, setup.mapping);
-  if (facts.fmi == 3) return std::make_unique<FmuCode<Instance3>>(setup, facts);
-  return std::make_unique<FmuCode<Instance2>>(setup, facts);
+  return std::make_unique<FmuCode>(setup, facts_of(setup.file, setup.folder, setup.mapping));
 }
 
 }  // namespace abs_hil::interchange

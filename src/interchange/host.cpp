@@ -30,16 +30,14 @@ Offences probe(ForeignCode& code, const HostRequest& request, const std::functio
   constexpr std::int64_t warming = 200;
   static_cast<void>(warm_up(code, request.period_s, warming));
   code.reset(trial_input(0, request.period_s));
-  Offences found;
-  if (!trap_system_calls(host_socket)) return found;
+  if (!trap_system_calls(host_socket)) return {};
   const std::uint64_t before = allocations();
   for (std::int64_t step = 0; step < request.count; ++step) {
     abs_hil_output output = no_output();
     code.step(trial_input(step, request.period_s), output);
   }
+  Offences found = trapped_system_calls();
   found.allocations = allocations() - before;
-  found.system_calls = trapped_system_calls().count;
-  found.first_system_call = trapped_system_calls().first;
   return found;
 }
 

@@ -19,7 +19,6 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/option.hpp"
-#include "driver/file_descriptor.hpp"
 #include "driver/spawn.hpp"
 #include "interchange/confinement.hpp"
 #include "rig/clean_text.hpp"
@@ -31,7 +30,6 @@ namespace abs_hil::interchange {
 
 namespace {
 
-constexpr std::string_view python_host = "abs_python_host";
 constexpr int step_limit_ms = 2'000;
 constexpr int start_limit_ms = 20'000;
 /// All steps of a run may take this long and this many times as long as the time that they simulate.
@@ -48,16 +46,13 @@ std::filesystem::path& program_of_the_host() {
   return program;
 }
 
-}  // namespace
-
-void set_host_beside(const std::string& program) { program_of_the_host() = program; }
-
+/// Path of the host's program, beside the running program, otherwise the installed one: abs_controller_host, for a
+/// class in Python abs_python_host of the Python package.
 std::string host_program(const std::filesystem::path& file) {
   std::error_code error;
   const std::filesystem::path& told = program_of_the_host();
   const std::filesystem::path self = told.empty() ? std::filesystem::read_symlink("/proc/self/exe", error) : told;
-  const std::string_view name =
-      rig::FileEndings::is_python_class(file.native()) ? python_host : std::string_view("abs_controller_host");
+  const char* name = rig::FileEndings::is_python_class(file.native()) ? "abs_python_host" : "abs_controller_host";
   const std::filesystem::path beside = self.parent_path() / name;
   // An installation may have been moved as a whole. A program that embeds the library uses the installed one.
   const std::filesystem::path moved = self.parent_path().parent_path() / ABS_HIL_HOST_DIR / name;
@@ -68,19 +63,23 @@ std::string host_program(const std::filesystem::path& file) {
   return beside.string();
 }
 
+}  // namespace
+
+void set_host_beside(const std::string& program) { program_of_the_host() = program; }
+
 void HostedCode::start(const std::string& program) {
   std::array<int, 2> ends{-1, -1};
   std::array<int, 2> pipe{-1, -1};
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     throw driver::Unavailable("socketpair: " + rig::refusal(errno, "", rig::starting));
   }
-  socket_ = ends[0];
+  socket_ = driver::FileDescriptor(ends[0]);
   const driver::FileDescriptor their_socket(ends[1]);
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
     throw driver::Unavailable("pipe: " + rig::refusal(errno, "", rig::starting));
-  prints_ = pipe[0];
+  prints_ = driver::FileDescriptor(pipe[0]);
   const driver::FileDescriptor their_prints(pipe[1]);
-  ::fcntl(prints_, F_SETFL, O_NONBLOCK);
+  ::fcntl(prints_.get(), F_SETFL, O_NONBLOCK);
   // Not the run's own stderr: nothing of the code's may hold that.
   const int error = driver::spawn(
       pid_, program,
@@ -99,7 +98,7 @@ HostedCode::HostedCode(const ForeignSetup& setup) : HostedCode(setup.period_s) {
   if (!setup.mapping.empty()) told.mapping = std::filesystem::absolute(setup.mapping);
   const std::string text = nlohmann::json(told).dump();
   std::string answer(host_packet_max, '\0');
-  const bool sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+  const bool sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   const ssize_t size = sent ? receive(answer.data(), answer.size(), start_limit_ms) : 0;
   if (size <= static_cast<ssize_t>(sizeof(HostRefusal))) {
     throw std::invalid_argument(fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(),
@@ -124,18 +123,16 @@ void HostedCode::end() noexcept {
     ::kill(pid_, SIGKILL);
     static_cast<void>(::waitpid(std::exchange(pid_, 0), nullptr, 0));
   }
-  if (prints_ >= 0) {
-    pass_on_prints();
-    ::close(std::exchange(prints_, -1));
-  }
-  if (socket_ >= 0) ::close(std::exchange(socket_, -1));
+  if (prints_.get() >= 0) pass_on_prints();
+  prints_ = driver::FileDescriptor();
+  socket_ = driver::FileDescriptor();
 }
 
 void HostedCode::pass_on_prints() noexcept {
   std::array<char, 4096> text;
   constexpr int parts = 32;  // all that a pipe holds; one who prints without end must not keep the run here
   for (int part = 0; part < parts; ++part) {
-    const ssize_t got = ::read(prints_, text.data(), text.size());
+    const ssize_t got = ::read(prints_.get(), text.data(), text.size());
     if (got <= 0) return;
     if (printed_ >= printed_max) continue;
     printed_ += static_cast<std::size_t>(got);
@@ -162,11 +159,11 @@ ssize_t HostedCode::receive(void* data, std::size_t size, int limit_ms) noexcept
   runtime::MonotonicClock clock;
   const std::int64_t until_ns = clock.now_ns() + std::int64_t{limit_ms} * 1'000'000;
   while (true) {
-    std::array<pollfd, 2> ready{{{socket_, POLLIN, 0}, {prints_, POLLIN, 0}}};
+    std::array<pollfd, 2> ready{{{socket_.get(), POLLIN, 0}, {prints_.get(), POLLIN, 0}}};
     const int polled = ::poll(ready.data(), ready.size(), slice_ms);
     if (polled > 0 && ready[1].revents != 0) pass_on_prints();
     if (polled > 0 && ready[0].revents != 0) {
-      const ssize_t got = ::recv(socket_, data, size, MSG_TRUNC);
+      const ssize_t got = ::recv(socket_.get(), data, size, MSG_TRUNC);
       return got < 0 ? 0 : got;
     }
     const bool closed_prints = polled > 0 && (ready[1].revents & POLLHUP) != 0;
@@ -215,8 +212,9 @@ std::string HostedCode::how_it_ended(ssize_t got, const void* answer) noexcept {
 }
 
 bool HostedCode::ask(const HostRequest& request, HostAnswer& answer) noexcept {
-  if (socket_ < 0 || !failure_.empty()) return false;
-  const bool sent = ::send(socket_, &request, sizeof request, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof request);
+  if (socket_.get() < 0 || !failure_.empty()) return false;
+  const bool sent =
+      ::send(socket_.get(), &request, sizeof request, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof request);
   const ssize_t got = sent ? receive(&answer, sizeof answer, step_limit_ms) : 0;
   constexpr std::uint64_t steps_between_looks = 256;
   const bool crowded = all_steps_ % steps_between_looks == 0 && too_many_threads();

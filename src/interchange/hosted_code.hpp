@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "driver/file_descriptor.hpp"
 #include "interchange/foreign_code.hpp"
 #include "interchange/host.hpp"
 
@@ -48,8 +49,8 @@ class HostedCode final : public ForeignCode {
   [[nodiscard]] std::string how_it_ended(ssize_t got, const void* answer) noexcept;
 
   pid_t pid_{0};
-  int socket_{-1};
-  int prints_{-1};  ///< pipe with what the code prints
+  driver::FileDescriptor socket_{};
+  driver::FileDescriptor prints_{};  ///< pipe with what the code prints
   std::size_t printed_{0};
   double period_s_;
   std::uint64_t steps_{0};      ///< since the last reset
@@ -61,9 +62,5 @@ class HostedCode final : public ForeignCode {
 /// For a process that is not abs_hil itself, as Python: the path of abs_hil, beside which the host's program is looked
 /// for. Call it before any controller is made.
 void set_host_beside(const std::string& program);
-
-/// Path of the host's program, beside the running program, otherwise the installed one: abs_controller_host, for a
-/// class in Python abs_python_host of the Python package.
-[[nodiscard]] std::string host_program(const std::filesystem::path& file);
 
 }  // namespace abs_hil::interchange

@@ -92,14 +92,7 @@ class GuardedPulse final : public experiment::PulseGuard {
   void begin() override {
     if (!guardian::needs_guardian(configuration_.settings, false)) return;
     recorder_.emplace(1);
-    const std::string launch_config = guardian_launch_json(configuration_, {});
-    if (lease_ != nullptr) {
-      lease_->cover(*recorder_, launch_config);
-      guardian_ = lease_.get();
-    } else {
-      own_guardian_.emplace(*recorder_, guardian::guardian_program(), launch_config);
-      guardian_ = &*own_guardian_;
-    }
+    guardian_ = &started_guardian(lease_.get(), own_guardian_, *recorder_, guardian_launch_json(configuration_, {}));
     watch_.emplace(guardian_->pages().run(), guardian_->pages().guard(), recorder_->ring());
     // The pulses run in this thread.
     guardian_->arm(runtime::scheduling_of_this_thread());

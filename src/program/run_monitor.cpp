@@ -51,6 +51,13 @@ std::string guardian_launch_json(const config::Configuration& configuration, con
                                         .record_prefix = record_prefix.string()});
 }
 
+guardian::Guard& started_guardian(guardian::GuardianLease* lease, std::optional<guardian::GuardianProcess>& own,
+                                  guardian::SharedRecorder& recorder, const std::string& launch_json) {
+  if (lease == nullptr) return own.emplace(recorder, guardian::guardian_program(), launch_json);
+  lease->cover(recorder, launch_json);
+  return *lease;
+}
+
 RunMonitor::RunMonitor(const RunRequest& request, guardian::GuardianLease* lease, std::filesystem::path record_prefix,
                        rig::RunNames names)
     : names_(std::move(names)),
@@ -63,14 +70,8 @@ RunMonitor::RunMonitor(const RunRequest& request, guardian::GuardianLease* lease
     heartbeat_.emplace(pages_->run(), pages_->guard(), recorder_.ring());
     return;
   }
-  const std::string launch_config = guardian_launch_json(request, record_prefix_, names_.signals);
-  if (lease != nullptr) {
-    lease->cover(recorder_, launch_config);
-    guardian_ = lease;
-  } else {
-    own_guardian_.emplace(recorder_, guardian::guardian_program(), launch_config);
-    guardian_ = &*own_guardian_;
-  }
+  guardian_ =
+      &started_guardian(lease, own_guardian_, recorder_, guardian_launch_json(request, record_prefix_, names_.signals));
   const guardian::Pages& pages = guardian_->pages();
   heartbeat_.emplace(pages.run(), pages.guard(), recorder_.ring(), silent_cycles_max(request.settings));
 }

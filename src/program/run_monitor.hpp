@@ -21,6 +21,11 @@ namespace abs_hil::program {
                                                const std::filesystem::path& record_prefix,
                                                const std::vector<std::string>& signals = {});
 
+/// The guardian of the recorder's owner: the lease's if there is one, else a new one in `own`.
+[[nodiscard]] guardian::Guard& started_guardian(guardian::GuardianLease* lease,
+                                                std::optional<guardian::GuardianProcess>& own,
+                                                guardian::SharedRecorder& recorder, const std::string& launch_json);
+
 /// Monitors a run: it keeps the flight record of every run, and starts the guardian for a run in real time on a board.
 class RunMonitor {
  public:

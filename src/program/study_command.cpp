@@ -155,6 +155,23 @@ int show_status(const std::string& path) {
 constexpr auto least_pause = std::chrono::milliseconds(100);
 constexpr double believable_after_s = 2.0;
 
+int study(const StudyCommand& command, const std::vector<std::string>& command_line) {
+  const bool below = command.merge.parsed() || command.status.parsed() || command.submit.parsed();
+  if (below && !command.parser.given().empty()) {
+    throw config::ConfigError(fmt::format("{}: give options of a subcommand of `abs_hil study` after its name",
+                                          command.parser.given().front()));
+  }
+  if (command.merge.parsed()) return merge_study(command.merged);
+  if (command.status.parsed()) return show_status(*command.folder);
+  if (command.submit.parsed()) return submit_study(command);
+  if (command.file.empty()) {
+    throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
+  }
+  if (!command.run) return run_study(command);
+  return record_run(study::make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
+                    command.folder, command_line);
+}
+
 }  // namespace
 
 Action add_study(cli::Parser& parser, const Words& words) {
@@ -178,23 +195,6 @@ int record_run(const study::Study& study, std::uint64_t number, const std::optio
   request.virtual_time = true;
   request.command_line = command_line;
   return run(request);
-}
-
-int study(const StudyCommand& command, const std::vector<std::string>& command_line) {
-  const bool below = command.merge.parsed() || command.status.parsed() || command.submit.parsed();
-  if (below && !command.parser.given().empty()) {
-    throw config::ConfigError(fmt::format("{}: give options of a subcommand of `abs_hil study` after its name",
-                                          command.parser.given().front()));
-  }
-  if (command.merge.parsed()) return merge_study(command.merged);
-  if (command.status.parsed()) return show_status(*command.folder);
-  if (command.submit.parsed()) return submit_study(command);
-  if (command.file.empty()) {
-    throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
-  }
-  if (!command.run) return run_study(command);
-  return record_run(study::make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
-                    command.folder, command_line);
 }
 
 RunProgress::RunProgress() : terminal_(isatty(STDERR_FILENO) == 1) { note_signals(true); }

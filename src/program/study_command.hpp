@@ -34,10 +34,6 @@ struct StudyCommand {
   cli::Parser submit{};
 };
 
-/// Runs the subcommand. Returns the exit status. Throws config::ConfigError, std::invalid_argument, driver::Unavailable
-/// and, for files that cannot be written, std::runtime_error.
-int study(const StudyCommand& command, const std::vector<std::string>& command_line);
-
 /// Repeats one run of a study with everything recorded in a run folder, as `abs_hil --fast --out FOLDER` does: from the
 /// beginning to the end of its experiment. Its config.toml repeats it once more. Returns the run's exit status.
 /// @param folder  new or empty; none: a new one below the folder of runs

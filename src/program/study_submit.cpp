@@ -177,8 +177,7 @@ std::string slurm_jobs(const std::string& folder) {
   std::ifstream file(fs::path(folder) / "slurm" / jobs_file);
   std::string ids;
   for (std::string id; std::getline(file, id);) {
-    const bool number = !id.empty() && id.find_first_not_of("0123456789") == std::string::npos;
-    if (number) ids += (ids.empty() ? "" : ",") + id;
+    if (rig::parse_number<std::uint64_t>(id)) ids += (ids.empty() ? "" : ",") + id;
   }
   if (ids.empty()) return {};
   const Printed printed =

@@ -40,6 +40,29 @@ std::map<std::string_view, FieldValue> values_of(const telemetry_t& message) {
   return values;
 }
 
+/// The first field in which two messages differ in their bits; empty if there is none.
+struct Difference {
+  std::string field;
+  std::string recorded;
+  std::string computed;
+};
+/// @param with_timing  false: does not compare durations, which no rerun can repeat
+Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing) {
+  const auto a = values_of(recorded);
+  const auto b = values_of(computed);
+  Difference difference;
+  // Fields are compared in the message's order: causes come before effects, except for estimates.
+  const auto compare = [&](std::string_view name) {
+    const bool is_timing = rig::topic_of(name) == rig::Topic::timing;
+    // What one of the two lacks is another version's.
+    if (!difference.field.empty() || (is_timing && !with_timing) || !a.contains(name) || !b.contains(name)) return;
+    if (a.at(name).bits != b.at(name).bits) difference = {std::string(name), a.at(name).text, b.at(name).text};
+  };
+  telemetry::visit_fields(recorded, [&compare](std::string_view name, const auto&) { compare(name); });
+  for (const telemetry::NamedValue& named : telemetry::values_of(recorded)) compare(named.name);
+  return difference;
+}
+
 bool same_bits(const telemetry_t& a, const telemetry_t& b) {
   telemetry::EncodeBuffer first, second;
   const auto bytes_a = first.encode(a);
@@ -99,22 +122,6 @@ std::string row(const std::string& name, double recorded, double replayed) {
 }
 
 }  // namespace
-
-Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing) {
-  const auto a = values_of(recorded);
-  const auto b = values_of(computed);
-  Difference difference;
-  // Fields are compared in the message's order: causes come before effects, except for estimates.
-  const auto compare = [&](std::string_view name) {
-    const bool is_timing = rig::topic_of(name) == rig::Topic::timing;
-    // What one of the two lacks is another version's.
-    if (!difference.field.empty() || (is_timing && !with_timing) || !a.contains(name) || !b.contains(name)) return;
-    if (a.at(name).bits != b.at(name).bits) difference = {std::string(name), a.at(name).text, b.at(name).text};
-  };
-  telemetry::visit_fields(recorded, [&compare](std::string_view name, const auto&) { compare(name); });
-  for (const telemetry::NamedValue& named : telemetry::values_of(recorded)) compare(named.name);
-  return difference;
-}
 
 CheckResult check(const RecordedRun& run) {
   const config::Settings settings = settings_of(run);

@@ -83,15 +83,6 @@ struct CheckResult {
 ///   encoder counts and true motion; for a run with --fast every telemetry message is compared byte by byte.
 [[nodiscard]] CheckResult check(const RecordedRun& run);
 
-/// The first field in which two messages differ in their bits; empty if there is none.
-struct Difference {
-  std::string field;
-  std::string recorded;
-  std::string computed;
-};
-/// @param with_timing  false: does not compare durations, which no rerun can repeat
-[[nodiscard]] Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing);
-
 /// A table that compares the commands of the replayed controller with those of the recorded one.
 [[nodiscard]] std::string report(const RecordedRun& run, const config::Settings& replayed,
                                  const std::vector<RerunCycle>& rerun);

@@ -4,6 +4,8 @@
 #include <bit>
 #include <boost/random/sobol.hpp>
 
+#include "rig/formatted_text.hpp"
+
 namespace abs_hil::study {
 
 namespace {
@@ -60,7 +62,7 @@ std::uint64_t permuted(std::uint64_t index, std::uint64_t count, std::array<std:
 
 Design::Design(DesignKind kind, std::uint64_t points, std::uint64_t seed, std::vector<std::string> factors)
     : kind_(kind), points_(points), seed_(seed) {
-  for (const std::string& factor : factors) names_.push_back(hash_of(factor));
+  for (const std::string& factor : factors) names_.push_back(rig::hash_of(factor));
   if (names_.empty() || (kind != DesignKind::sobol && kind != DesignKind::saltelli)) return;
   // Point n of the sequence is the sum, modulo 2, of the direction numbers at the bits of n's Gray code. The Gray code
   // of 2^(bit + 1) - 1 has this bit alone. Boost's sequence leaves out point 0.

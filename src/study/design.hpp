@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace abs_hil::study {
@@ -19,13 +18,6 @@ namespace abs_hil::study {
 /// A number in (0, 1), from the upper 52 bits. Neither end occurs, so that every distribution has its quantile.
 [[nodiscard]] constexpr double open_unit(std::uint64_t bits) noexcept {
   return (static_cast<double>(bits >> 12U) + 0.5) * 0x1p-52;
-}
-
-/// FNV-1a, 64 bits: the same on every computer.
-[[nodiscard]] constexpr std::uint64_t hash_of(std::string_view text) noexcept {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return hash;
 }
 
 /// A permutation of 0 to count - 1 that needs no memory: a Feistel network over the next larger power of four, walked

@@ -52,7 +52,6 @@ class Study {
     return contenders_[study_case];
   }
   [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
-  [[nodiscard]] std::uint64_t points() const noexcept { return design_.rows(); }
 
   /// @param run  < runs()
   [[nodiscard]] RunIndex index_of(std::uint64_t run) const noexcept;

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -14,6 +13,7 @@
 #include "config/key_table.hpp"
 #include "files/result_file.hpp"
 #include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
@@ -176,10 +176,8 @@ std::vector<bool> StudyFolder::finished() const {
   for (const auto& entry : fs::directory_iterator(path_ / file::parts, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.ends_with(part_ending)) continue;
-    std::uint64_t number = 0;
-    const auto [at, problem] = std::from_chars(name.data(), name.data() + name.size() - part_ending.size(), number);
-    const bool whole = problem == std::errc() && std::string_view(at) == part_ending;
-    if (whole && number < finished.size()) finished[number] = true;
+    const auto number = rig::parse_number<std::uint64_t>(name.substr(0, name.size() - part_ending.size()));
+    if (number && *number < finished.size()) finished[*number] = true;
   }
   return finished;
 }

@@ -59,6 +59,11 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
   return static_cast<std::size_t>(at - out);
 }
 
+std::string csv_number(double value) {
+  char digits[longest_value];
+  return {digits, put(digits, value)};
+}
+
 CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::RunNames names)
     : file_(std::move(path), "CSV file", write_period_ns > 0),
       write_period_ns_(write_period_ns),

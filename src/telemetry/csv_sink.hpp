@@ -29,6 +29,9 @@ inline constexpr std::string_view phase_name_column = "phase_name";
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
                            const rig::RunNames& names = {}) noexcept;
 
+/// A number as in these rows.
+[[nodiscard]] std::string csv_number(double value);
+
 /// Writes one row per cycle to a file (RecordFile).
 class CsvSink : public rig::RecordSink {
  public:

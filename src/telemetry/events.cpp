@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "rig/reason_text.hpp"
-#include "telemetry/csv_text.hpp"
+#include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::telemetry {
 

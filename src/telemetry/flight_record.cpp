@@ -8,7 +8,6 @@
 #include "files/result_file.hpp"
 #include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/csv_text.hpp"
 #include "telemetry/log_outlet.hpp"
 
 namespace abs_hil::telemetry {

@@ -39,19 +39,14 @@ LcmOutlet::LcmOutlet(std::string url)
 }
 
 void LcmOutlet::send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept {
-  if (time_s < next_try_s_) {
-    ++failures_;
+  const bool tcpq = provider_ == "tcpq";
+  const bool tries = time_s >= next_try_s_ && (!tcpq || tcpq_ready(time_s));
+  if (tries && lcm_publish(lcm_.getUnderlyingLCM(), channel.c_str(), message.data(),
+                           static_cast<unsigned int>(message.size())) == 0) {
     return;
   }
-  if (provider_ == "tcpq" && !tcpq_ready(time_s)) {
-    ++failures_;
-    return;
-  }
-  const int result =
-      lcm_publish(lcm_.getUnderlyingLCM(), channel.c_str(), message.data(), static_cast<unsigned int>(message.size()));
-  if (result == 0) return;
   ++failures_;
-  if (provider_ == "tcpq") next_try_s_ = time_s + tcpq_retry_s;
+  if (tries && tcpq) next_try_s_ = time_s + tcpq_retry_s;
 }
 
 bool LcmOutlet::tcpq_ready(double time_s) noexcept {

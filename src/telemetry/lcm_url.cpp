@@ -4,18 +4,19 @@
 #include <arpa/inet.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/endian/conversion.hpp>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <stdexcept>
-#include <system_error>
 
 #include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -43,13 +44,10 @@ Endpoint endpoint_of(const LcmUrl& url) {
   if (colon == std::string_view::npos) return endpoint;
 
   const std::string_view port = network.substr(colon + 1);
-  const char* end = port.data() + port.size();
-  const auto [stop, error] = std::from_chars(port.data(), end, endpoint.port);
-  if (error != std::errc{} || stop != end || endpoint.port == 0) {
-    throw std::invalid_argument("port '" + std::string(port) +
-                                "' of the LCM URL is not valid; give a number from 1 to 65535");
-  }
-  return endpoint;
+  endpoint.port = rig::parse_number<std::uint16_t>(port).value_or(0);
+  if (endpoint.port > 0) return endpoint;
+  throw std::invalid_argument("port '" + std::string(port) +
+                              "' of the LCM URL is not valid; give a number from 1 to 65535");
 }
 
 std::string default_lcm_url() {
@@ -74,20 +72,11 @@ constexpr std::uint32_t protocol_version = 0x0100;
 /// The kernel grants at most twice net.core.wmem_max, about 400 kB by default. It reports room while a third is free.
 constexpr int send_buffer_bytes = 1 << 20;
 
-class Deadline {
- public:
-  explicit Deadline(int timeout_ms) : end_(Clock::now() + std::chrono::milliseconds(timeout_ms)) {}
-  /// False if it does not become ready in time.
-  [[nodiscard]] bool wait(int socket, short events) const noexcept {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end_ - Clock::now()).count();
-    pollfd ready{socket, events, 0};
-    return left > 0 && ::poll(&ready, 1, static_cast<int>(left)) > 0;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point end_;
-};
+/// What the error of a call with a limit of time says of the server.
+TcpqServer failed_call() noexcept {
+  const bool in_vain = errno == EINPROGRESS || errno == EAGAIN || errno == EINTR;
+  return in_vain ? TcpqServer::silent : TcpqServer::absent;
+}
 
 constexpr const char* route_fix =
     "sudo ip link set lo up multicast on\n"
@@ -142,17 +131,18 @@ RouteProbe probe_lcm_route(std::string_view url) {
 }
 
 TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept {
-  const Deadline deadline(timeout_ms);
+  using namespace std::chrono;
+  const auto end = steady_clock::now() + milliseconds(timeout_ms);
   const auto to = socket_address_of(endpoint);
-  const Socket socket(SOCK_STREAM | SOCK_NONBLOCK);
+  const Socket socket(SOCK_STREAM);
   if (socket.get() < 0 || !to) return TcpqServer::absent;
-  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&*to), sizeof *to) != 0) {
-    if (errno != EINPROGRESS) return TcpqServer::absent;
-    if (!deadline.wait(socket.get(), POLLOUT)) return TcpqServer::silent;
-    int error = 0;
-    socklen_t size = sizeof error;
-    if (::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size) != 0 || error != 0) return TcpqServer::absent;
-  }
+  const auto limit = [&](int calls) {
+    const auto left = std::max(ceil<microseconds>(end - steady_clock::now()), microseconds(1));  // 0 would be no limit
+    const timeval most{left / seconds(1), (left % seconds(1)).count()};
+    static_cast<void>(::setsockopt(socket.get(), SOL_SOCKET, calls, &most, sizeof most));
+  };
+  limit(SO_SNDTIMEO);
+  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&*to), sizeof *to) != 0) return failed_call();
   const std::array<std::uint32_t, 2> greeting{htonl(client_greeting), htonl(protocol_version)};
   if (::send(socket.get(), greeting.data(), sizeof greeting, MSG_NOSIGNAL) != sizeof greeting) {
     return TcpqServer::absent;
@@ -160,9 +150,10 @@ TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept {
   constexpr std::size_t answer_bytes = 8;
   std::array<std::uint8_t, answer_bytes> answer{};
   for (std::size_t got = 0; got < answer.size();) {
-    if (!deadline.wait(socket.get(), POLLIN)) return TcpqServer::silent;
+    limit(SO_RCVTIMEO);
     const ssize_t size = ::recv(socket.get(), answer.data() + got, answer.size() - got, 0);
-    if (size <= 0) return TcpqServer::absent;
+    if (size < 0) return failed_call();
+    if (size == 0) return TcpqServer::absent;
     got += static_cast<std::size_t>(size);
   }
   return boost::endian::load_big_u32(answer.data()) == server_greeting ? TcpqServer::answers : TcpqServer::silent;

@@ -16,6 +16,18 @@
 namespace abs_hil::telemetry {
 namespace {
 
+void check_channel_prefix(std::string_view prefix) {
+  constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
+  const auto allowed = [](unsigned char c) {
+    // No characters of regular expressions, because a subscription is a regular expression.
+    return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
+  };
+  if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
+    throw std::invalid_argument("channel prefix '" + rig::clean_text(prefix, 80) +
+                                "' is not valid; give at most 48 letters, digits, '_', '-' and '/'");
+  }
+}
+
 void check(const StreamOptions& options) {
   check_channel_prefix(options.channel_prefix);
   if (options.telemetry_every_cycles == 0) throw std::invalid_argument("telemetry_every_cycles must be at least 1");
@@ -50,18 +62,6 @@ void put_timing(const rig::TimingSummary& timing, status_t& m) {
 }
 
 }  // namespace
-
-void check_channel_prefix(std::string_view prefix) {
-  constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
-  const auto allowed = [](unsigned char c) {
-    // No characters of regular expressions, because a subscription is a regular expression.
-    return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
-  };
-  if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
-    throw std::invalid_argument("channel prefix '" + rig::clean_text(prefix, 80) +
-                                "' is not valid; give at most 48 letters, digits, '_', '-' and '/'");
-  }
-}
 
 MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
     : options_(std::move(options)),

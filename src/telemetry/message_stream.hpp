@@ -47,9 +47,6 @@ struct StreamOptions {
   double experiment_period_s{5.0};          ///< of run time, > 0
 };
 
-/// Throws std::invalid_argument for an invalid prefix of StreamOptions. The text names the prefix and what is valid.
-void check_channel_prefix(std::string_view prefix);
-
 /// Turns records into the messages of the ABS_ channels and gives the same messages to every outlet. Each channel's
 /// sequence counts from 0 without gaps. All stamps and times are those of the records, so that a run on virtual time
 /// always gives the same bytes. Use one stream for each run, from one thread.

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rig/formatted_text.hpp"
+
 namespace abs_hil::interchange::fmu {
 
 namespace {
@@ -29,7 +31,7 @@ void exchange_text(rig::StateBytes& bytes, std::string& text) {
 
 std::string to_bytes(const State& state) {
   rig::StateBytes end;
-  std::uint64_t sum = hash_of(state);  // finds damage, no ill will
+  std::uint64_t sum = rig::hash_of(state);  // finds damage, no ill will
   end(sum);
   return std::string(state_mark) + state + end.written();
 }

@@ -10,14 +10,12 @@ namespace {
 
 using namespace abs_hil::interchange::fmu;
 
-template <class Action>
-fmi3Status done(fmi3Instance instance, const Action& action) noexcept {
-  return guarded(of(instance), fmi3OK, fmi3Error, action);
-}
+using Status = fmi3Status;
+static_assert(ok<Status> == fmi3OK && failed<Status> == fmi3Error);
 
 template <class Action>
 fmi3Status done_with(size_t references, size_t values, fmi3Instance instance, const Action& action) {
-  return done(instance, [&] {
+  return done<Status>(instance, [&] {
     if (references != values)
       throw std::invalid_argument("as many values as references are needed: there are no arrays here");
     action();
@@ -28,8 +26,10 @@ fmi3Status done_with(size_t references, size_t values, fmi3Instance instance, co
 
 extern "C" {
 
-const char* fmi3GetVersion() { return fmi3Version; }
-fmi3Status fmi3SetDebugLogging(fmi3Instance, fmi3Boolean, size_t, const fmi3String[]) { return fmi3OK; }
+#define ABS_HIL_FMI(name) fmi3##name
+#define ABS_HIL_FMI_OF_STATE(before, behind) fmi3##before##FMUState##behind
+#define ABS_HIL_FMI_READ_STATE fmi3DeserializeFMUState
+#include "interchange/fmu/both_versions.hpp"
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
                                          fmi3Boolean /*visible*/, fmi3Boolean /*logging*/, fmi3Boolean /*events*/,
@@ -49,18 +49,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     return nullptr;
   }
 }
-void fmi3FreeInstance(fmi3Instance instance) { delete of(instance); }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean, fmi3Float64, fmi3Float64 start_s,
                                        fmi3Boolean, fmi3Float64) {
-  return done(instance, [&] { of(instance)->set_start_time(start_s); });
-}
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-  return done(instance, [&] { of(instance)->start(); });
-}
-fmi3Status fmi3Terminate(fmi3Instance instance) { return instance == nullptr ? fmi3Error : fmi3OK; }
-fmi3Status fmi3Reset(fmi3Instance instance) {
-  return done(instance, [&] { of(instance)->reset(); });
+  return done<Status>(instance, [&] { of(instance)->set_start_time(start_s); });
 }
 
 // Reads and sets variables: FMI's name of the type, and the type in the model.
@@ -77,30 +69,11 @@ ABS_HIL_VALUES(Boolean, bool)
 ABS_HIL_VALUES(String, std::string)
 #undef ABS_HIL_VALUES
 
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState* state) {
-  return done(c, [&] { keep(of(c)->state(), *state); });
-}
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-  return done(c, [&] { of(c)->restore(*static_cast<State*>(state)); });
-}
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState* state) {
-  return done(c, [&] { delete static_cast<State*>(std::exchange(*state, nullptr)); });
-}
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t* size) {
-  return done(c, [&] { *size = to_bytes(*static_cast<State*>(state)).size(); });
-}
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-  return done(c, [&] { write_bytes(*static_cast<State*>(state), bytes, size); });
-}
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState* state) {
-  return done(c, [&] { keep(state_of(std::string(bytes, bytes + size)), *state); });
-}
-
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time_s, fmi3Float64 duration_s, fmi3Boolean,
                       fmi3Boolean* event_needed, fmi3Boolean* terminate, fmi3Boolean* early, fmi3Float64* last_time_s) {
   *event_needed = *terminate = *early = fmi3False;
   *last_time_s = time_s;
-  return done(instance, [&] {
+  return done<Status>(instance, [&] {
     of(instance)->step(time_s, duration_s);
     *last_time_s = time_s + duration_s;
   });
@@ -118,7 +91,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String, fmi3String, fmi3Strin
 }
 #define ABS_HIL_AT const fmi3ValueReference[], size_t
 #define ABS_HIL_NOT_THERE(function, ...) \
-  fmi3Status function(fmi3Instance i __VA_OPT__(, ) __VA_ARGS__) { return not_there(i, fmi3Error, #function); }
+  fmi3Status function(fmi3Instance i __VA_OPT__(, ) __VA_ARGS__) { return not_there<Status>(i, #function); }
 #define ABS_HIL_NO_VALUES(type)                                      \
   ABS_HIL_NOT_THERE(fmi3Get##type, ABS_HIL_AT, fmi3##type[], size_t) \
   ABS_HIL_NOT_THERE(fmi3Set##type, ABS_HIL_AT, const fmi3##type[], size_t)

@@ -26,7 +26,7 @@ std::string token_of(std::string_view kind, const Model& model) {
              std::to_string(static_cast<int>(variable.causality)) + ';';
   }
   std::array<char, 17> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), hash_of(names), 16).ptr;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), rig::hash_of(names), 16).ptr;
   return "abs_hil-" + std::string(kind) + '-' + std::string(digits.data(), end);
 }
 

@@ -66,13 +66,6 @@ inline constexpr std::string_view controller_kind = "controller";
 /// The model of that kind with default parameters; null for an unknown kind.
 [[nodiscard]] std::unique_ptr<Model> make_model(std::string_view kind);
 
-/// FNV-1a, 64 bits.
-[[nodiscard]] constexpr std::uint64_t hash_of(std::string_view text) noexcept {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return hash;
-}
-
 /// Names, types and order of the variables as a number: a binary refuses a description that another version made.
 [[nodiscard]] std::string token_of(std::string_view kind, const Model& model);
 

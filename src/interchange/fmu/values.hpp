@@ -14,27 +14,33 @@
 
 namespace abs_hil::interchange::fmu {
 
-/// Calls `action`; what it throws goes to the instance's log, and `failed` is returned.
-template <class Status, class Action>
-Status guarded(Component* component, Status ok, Status failed, const Action& action) noexcept {
-  if (component == nullptr) return failed;
-  try {
-    action();
-    return ok;
-  } catch (const std::exception& error) {
-    component->log(true, error.what());
-    return failed;
-  }
-}
-
 /// The instance behind a tool's pointer.
 [[nodiscard]] inline Component* of(void* instance) noexcept { return static_cast<Component*>(instance); }
 
+/// Both versions give these statuses the same numbers.
+template <class Status>
+constexpr Status ok = static_cast<Status>(0);
+template <class Status>
+constexpr Status failed = static_cast<Status>(3);
+
+/// Calls `action`; what it throws goes to the instance's log, and the call has failed.
+template <class Status, class Action>
+Status done(void* instance, const Action& action) noexcept {
+  if (instance == nullptr) return failed<Status>;
+  try {
+    action();
+    return ok<Status>;
+  } catch (const std::exception& error) {
+    of(instance)->log(true, error.what());
+    return failed<Status>;
+  }
+}
+
 /// Answers a function that these FMUs do not have.
 template <class Status>
-Status not_there(void* instance, Status failed, const char* function) noexcept {
-  if (instance != nullptr) of(instance)->log(true, std::string(function) + ": this FMU cannot do that");
-  return failed;
+Status not_there(void* instance, const char* function) noexcept {
+  return done<Status>(instance,
+                      [function] { throw std::invalid_argument(std::string(function) + ": this FMU cannot do that"); });
 }
 
 /// Gives a state to the tool, in the object that it has from a call before, or in a new one.
