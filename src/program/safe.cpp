@@ -1,8 +1,6 @@
 // `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else.
 #include <fmt/format.h>
 #include <poll.h>
-#include <sched.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +19,7 @@
 #include "driver/monotonic_time.hpp"
 #include "guardian/board_owners.hpp"
 #include "guardian/guardian_lease.hpp"
+#include "program/first_place.hpp"
 #include "program/subcommands.hpp"
 #include "program/zero_writing.hpp"
 
@@ -45,16 +44,6 @@ constexpr int owners_found_within_ms = 2000;
 constexpr int service_answers_within_ms = 500;
 constexpr int written_out_within_ms = 2000;
 constexpr int threads_end_within_ms = 200;
-
-/// Gives this process precedence over ordinary work and over every run. Without the right to it nothing happens.
-void take_first_place() noexcept {
-  constexpr int most_nice = -20;
-  sched_param wanted{};
-  wanted.sched_priority = ::sched_get_priority_max(SCHED_FIFO) - 1;
-  if (::sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
-    static_cast<void>(::setpriority(PRIO_PROCESS, 0, most_nice));
-  }
-}
 
 /// Does the work in a thread of its own, which goes on if it hangs.
 template <typename Work>
