@@ -83,6 +83,8 @@ class Instance {
  public:
   Instance(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources)
       : is_fmi3_(facts.fmi == 3),
+        instantiate_(library, name_of(facts, is_fmi3_ ? "InstantiateCoSimulation" : "Instantiate")),
+        set_up_(is_fmi3_ ? std::nullopt : std::optional<Function>({library, "fmi2SetupExperiment"})),
         enter_(library, name_of(facts, "EnterInitializationMode")),
         exit_(library, name_of(facts, "ExitInitializationMode")),
         reset_(library, name_of(facts, "Reset")),
@@ -90,12 +92,11 @@ class Instance {
         instance_(nullptr, library.find<void(void*)>(name_of(facts, "FreeInstance").c_str())) {
     if (is_fmi3_) {
       const std::string path = resources + "/";
-      instance_.reset(library.find<fmi3InstantiateCoSimulationTYPE>("fmi3InstantiateCoSimulation")(
+      instance_.reset(reinterpret_cast<fmi3InstantiateCoSimulationTYPE*>(instantiate_.at)(
           "controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False, fmi3False, nullptr, 0,
           nullptr, log3, nullptr));
     } else {
-      set_up_.emplace(library, "fmi2SetupExperiment");
-      instance_.reset(library.find<fmi2InstantiateTYPE>("fmi2Instantiate")(
+      instance_.reset(reinterpret_cast<fmi2InstantiateTYPE*>(instantiate_.at)(
           "controller", fmi2CoSimulation, facts.token.c_str(), rig::file_uri(resources).c_str(), &callbacks_, fmi2False,
           fmi2False));
     }
@@ -135,7 +136,9 @@ class Instance {
 
   bool is_fmi3_;
   fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
-  std::optional<Function> set_up_{};  ///< of FMI 2
+  // In this order they are looked for: an FMU hears of the first that it lacks.
+  Function instantiate_;
+  std::optional<Function> set_up_;  ///< of FMI 2
   Function enter_;
   Function exit_;
   Function reset_;
