@@ -415,7 +415,7 @@ def test_readings_that_the_rig_marks_as_lost_are_left_out():
 
 @pytest.mark.parametrize(('given', 'words'), [
     (['--seed', '-1'], 'whole number from 0'),
-    (['--fix', 'J2_kg_m2=nan'], r'--fix J2_kg_m2 = nan is not valid; give a number in \[0.0001, 1\] kg m\^2'),
+    (['--fix', 'J2_kg_m2=nan'], r'--fix J2_kg_m2 = nan is not valid; give a number in \[0.0001, 1000\] kg m\^2'),
     (['--fix', 'J2_kg_m2=-1'], r'--fix J2_kg_m2 = -1 is not valid; give a number in'),
     (['--fix', 'r2_m=inf'], r'--fix r2_m = inf is not valid; give a number in'),
     (['--validate', 'nosuch'], 'nosuch'),
