@@ -8,7 +8,6 @@
 #include <bit>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 
 #include "abs_hil/rig/brake_map.hpp"

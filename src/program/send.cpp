@@ -1,5 +1,4 @@
 // `abs_hil send`: a command to a running abs_hil, and its answer.
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <memory>

@@ -8,7 +8,6 @@
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/phase.hpp"
-#include "abs_hil/rig/reason.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "rig/gate_counts.hpp"
 #include "runtime/encoder_check.hpp"

@@ -11,7 +11,6 @@
 
 #include "abs_hil/message_fields.hpp"
 #include "abs_hil/rig/quantities.hpp"
-#include "telemetry/checked_decode.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -10,7 +10,6 @@
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/can/bus.hpp"
-#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::can {
 

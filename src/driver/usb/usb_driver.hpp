@@ -1,13 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "driver/pwm.hpp"
 #include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {
