@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "analysis/run_metrics.hpp"
 #include "rig/gate_counts.hpp"
 #include "rig/timing_summary.hpp"
 

@@ -10,13 +10,11 @@
 #include <variant>
 
 #include "abs_hil/rig/option_check.hpp"
-#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 
 namespace {
 
-using experiment::BrakeAction;
 using experiment::EndKind;
 using experiment::PhasePlan;
 using Verdict = SafetyRow::Verdict;
@@ -41,8 +39,7 @@ double awaited_rad_s(const experiment::EndCondition& end, double r2_m) {
 
 /// True if a person has consented: by the key in `unsafe.keys`, or by the flag that its row names.
 bool is_accepted(const Key& key, const Settings& s, const KeyTable& keys) {
-  const std::vector<std::string_view> named = rig::split(s.unsafe.keys, ',');
-  if (std::ranges::find(named, key.name) != named.end()) return true;
+  if (fmt::format(",{},", s.unsafe.keys).find(fmt::format(",{},", key.name)) != std::string::npos) return true;
   const Key* flag = find_key(keys.keys(), fmt::format("unsafe.{}", key.safety.consent));
   return flag != nullptr && value_of(*flag) == Value(true);
 }
@@ -87,8 +84,8 @@ SafetyView safety_view(const Settings& s, const KeyTable& keys, const Plan& plan
     const Key& key = *find_key(keys.keys(), name);
     add(what, fmt::format("{:.6g}", value), key, rig::weakens(key, value));
   };
-  double drive_s = 0.0;  // phases that follow one another with the drive on are one drive, however a script divides it
-  double whole_s = 0.0;
+  // Phases that follow one another with the drive on are one drive, however a script divides it.
+  double drive_s = 0.0, whole_s = 0.0;
   for (const PhasePlan& phase : plan.phases) {
     const std::string name = fmt::format("phase \"{}\": ", phase.name);
     const bool drives = !phase.motor_duty.zero();
@@ -100,7 +97,7 @@ SafetyView safety_view(const Settings& s, const KeyTable& keys, const Plan& plan
       const double awaited = awaited_rad_s({.parts = phase.ends_on}, s.rig.parameters.wheels.r2_m);
       if (awaited > 0.0) judge(name + "drives until a wheel turns at", awaited, "experiment.cut_speed_rad_s");
     }
-    if (phase.brake == BrakeAction::released) continue;
+    if (phase.brake == experiment::BrakeAction::released) continue;
     judge(name + "brake on for at most", longest_s(phase),
           phase.phase == rig::Phase::hold ? "experiment.hold_limit_s" : "experiment.brake_limit_s");
   }

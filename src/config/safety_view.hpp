@@ -23,8 +23,7 @@ struct SafetyRow {
 };
 using SafetyView = std::vector<SafetyRow>;
 
-/// @param keys  of `s`
-/// @param plan  of `s`, with the duties as the script asks for them
+/// @param keys, plan  of `s`
 [[nodiscard]] SafetyView safety_view(const Settings& s, const KeyTable& keys, const Plan& plan);
 
 /// Throws std::invalid_argument for the first weak row; the text names value, bound and fix.

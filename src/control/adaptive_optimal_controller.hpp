@@ -116,8 +116,7 @@ class AdaptiveOptimalLaw {
   rig::BasicBrake<S> brake_{};
   BasicBrakeLag<S> lag_{};
   BasicStatePredictor<S> predictor_{};
-  S dead_time_s_{0.0};
-  S torque_scale_{1.0};
+  S dead_time_s_{0.0}, torque_scale_{1.0};
   S period_s_{0.0};
   S v_min_m_s_{0.0};
   BasicProximateTorque<S> loop_{};

@@ -218,8 +218,7 @@ class BasicFrictionBank {
   FrictionBankOptions<S> options_{};
   S rate_Hz_{0.0};
   S quick_delay_s_{0.0};
-  S theta_least_N_{0.0}, theta_most_N_{0.0}, theta_variance_least_N2_{0.0};
-  S seen_N_{0.0};
+  S theta_least_N_{0.0}, theta_most_N_{0.0}, theta_variance_least_N2_{0.0}, seen_N_{0.0};
   S last_dt_s_{0.0};
   S quick_covered_{0.0};  ///< of its distance, by the delay of the quick force in `last_dt_s_`
   Words prior_{};         ///< the same for all shapes

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "run_folder/run_folder.hpp"
+
 namespace abs_hil::run_folder {
 
 inline constexpr std::string_view series_index = "series.json";

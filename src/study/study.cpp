@@ -9,6 +9,7 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/quantities.hpp"
+#include "analysis/run_metrics.hpp"
 #include "config/config_error.hpp"
 #include "config/merge.hpp"
 #include "rig/nearest_name.hpp"

@@ -15,6 +15,8 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
+#include "driver/file_descriptor.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
 
