@@ -108,12 +108,11 @@ SafetyView safety_view(const Settings& s, const KeyTable& keys, const Plan& plan
 std::vector<std::string> refuse_weak_rows(const SafetyView& view) {
   std::vector<std::string> accepted;
   for (const SafetyRow& row : view) {
-    if (row.verdict == Verdict::weak) {
+    if (row.verdict == Verdict::weak)
       throw std::invalid_argument(
           fmt::format("{} = {}: this value weakens the protection of a real board ({}); give another one, or accept "
                       "the risk with {}",
                       row.what, row.value, row.bound, row.fix));
-    }
     if (row.verdict != Verdict::accepted) continue;
     accepted.push_back(fmt::format("{} = {} weakens the protection of this board ({}); unsafe. accepts it", row.what,
                                    row.value, row.bound));

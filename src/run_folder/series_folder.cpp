@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "files/result_file.hpp"
 #include "rig/error_words.hpp"
 #include "rig/parse_json.hpp"
 
