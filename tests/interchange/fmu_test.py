@@ -63,7 +63,7 @@ class FmuTest(ProgramTest):
                 self.assertLessEqual(without, {'m^0.5/s^1.5'})
             variables = {v.name: v for v in description.modelVariables}
             theta = variables['plant.theta_N']
-            self.assertEqual((float(theta.start), theta.unit, float(theta.max)), (30.0, 'N', 500.0))
+            self.assertEqual((float(theta.start), theta.unit, float(theta.max)), (30.0, 'N', 100000.0))
             self.assertTrue(theta.description)
             self.assertEqual(variables['upper_counts'].causality, 'output')
             self.assertEqual(variables['brake_duty'].causality, 'input')
