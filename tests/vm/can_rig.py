@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 import unittest
+import zlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'app'))
 from emulator_process import EmulatorProcess  # noqa: E402
@@ -50,9 +51,11 @@ def put_record(folder, interface):
     """A commissioning record of the node behind an adapter, which counts as hardware. Nobody is here to commission it."""
     keys = re.findall(r'(?m)^(driver\.can\.\w+) +(\S+)', shell(f'{PROGRAM} list --keys'))
     options = {**dict(keys), 'driver.can.watchdog_ms': str(WATCHDOG_MS)}
-    record = {'abs_hil_board_record': 1, 'driver_kind': 'can', 'place': interface, 'logic': 'protocol 1',
+    record = {'abs_hil_board_record': 2, 'driver_kind': 'can', 'place': interface, 'logic': 'protocol 1',
               'emulated': False, 'date': '', 'version': '', 'encoder_counts_per_rev': 4096,
-              'counts_of_one_turn': {'upper': 4096, 'lower': 4096}, 'options': options}
+              'counts_of_one_turn': {'upper': 4096, 'lower': 4096}, 'options': options,
+              'identity': {}}
+    record['checksum'] = f"{zlib.crc32(json.dumps(record, separators=(',', ':')).encode()):08x}"
     (folder / f'can-{interface}.json').write_text(json.dumps(record))
 
 
@@ -85,7 +88,7 @@ class CanRigTest(unittest.TestCase):
              '--set', f'driver.can.watchdog_ms={WATCHDOG_MS}', '--set', f'driver.records={self.folder}',
              # A guardian that cannot verify would go on until a person releases it.
              '--set', 'driver.emulated=true', '--set', 'guardian.insist_s=1',
-             '--set', 'unsafe.keys=guardian.insist_s', *map(str, args)],
+             '--set', 'unsafe.keys=guardian.insist_s,driver.records', *map(str, args)],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.ends.append(lambda: (program.kill() if program.poll() is None else None, program.communicate()))
         return program
