@@ -38,6 +38,11 @@ OTHERS = {'two lags': ({'release': 1.5}, {'brake_release_ratio': 1.5}), 'bent ma
           'unequal slots': ({'slots': 0.3}, {'upper_encoder_slot_error_counts': 0.3}),
           'brake that cools': ({'fading_per_J': 4e-4, 'cools_in_s': 4.0},
                                {'brake_fading_per_J': 4e-4, 'brake_cooling_per_s': 0.25})}
+#: what one may say of a feature for which identify has no name
+HONEST = ('the model lacks something', 'the fit did not get there')
+OTHERS |= {'lever with play': ({'play': 0.06}, HONEST), 'lever that lags': ({'lever_s': 0.02}, HONEST),
+           'second lag': ({'second_lag_s': 0.012}, HONEST), 'bearings with stiction': ({'stiction': 0.6}, HONEST),
+           'duty of 8 bits': ({'bits': 8}, {}), 'disc off its middle': ({'eccentric_rad': 3e-3}, {})}
 #: features of each kind, joined by " + "
 KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc', 'fading + dead time', 'hysteresis + rate limit',
          'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time',
@@ -45,7 +50,9 @@ KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc'
          'quiet + slots')
 KINDS_OF_OTHERS = ('other', 'two lags', 'bent map', 'friction by sliding speed', 'two lags + quiet',
                    'friction by car speed', 'brake that cools', 'unequal slots', 'bearings that warm up', 'friction by Stribeck',
-                   'readings that jitter', 'readings that jitter + quiet')
+                   'readings that jitter', 'readings that jitter + quiet', 'lever with play', 'lever that lags', 'second lag',
+                   'bearings with stiction', 'duty of 8 bits', 'disc off its middle', 'duty of 8 bits + quiet',
+                   'disc off its middle + brake that cools')
 
 
 def one(plant, kind, seed, keep=None):
