@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/runs.hpp"
 
 namespace {
@@ -20,7 +20,7 @@ void thousand_runs(benchmark::State& state) {
   const Study study({.controllers = {"adaptive", "sliding-mode"},
                      .repeat = {.runs = 500, .seed = 3, .variation = Variation::standard()}},
                     {{.settings = settings_of("adaptive")}});
-  const std::size_t threads = machine_threads();
+  const std::size_t threads = run::machine_threads();
   std::vector<Outcome> outcomes(study.runs());
   for (auto _ : state) {
     run_part(

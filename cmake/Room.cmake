@@ -4,7 +4,7 @@
 # its sources need, LIBRARIES_BEYOND_CORE ones that only those beyond the core need.
 #
 # Public headers stand in include/abs_hil/NAME and are included as "abs_hil/NAME/x.hpp"; the others stand beside their
-# sources in src/NAME and are included as "NAME/x.hpp". Each room has an include folder of its own that holds nothing
+# sources in src/NAME, of an extra in extras/NAME, and are included as "NAME/x.hpp". Each room has an include folder of its own that holds nothing
 # but links to these two. A room's sources see its own and those of the rooms that it may know, and no others: rooms are
 # linked privately, so what a known room knows is not seen.
 include(Rooms)
@@ -12,6 +12,15 @@ include(Core)
 
 option(ABS_HIL_UNITY "Compile the sources of a room together: half the time from scratch, more after a small change" ON)
 set(ABS_HIL_ROOM_FOLDERS ${CMAKE_BINARY_DIR}/rooms)
+include(CMakeDependentOption)
+option(ABS_HIL_EXTRAS "Build the rooms of extras/, each of which has a switch of its own" ON)
+foreach(room IN LISTS ABS_HIL_EXTRA_ROOMS)
+  string(TOUPPER ABS_HIL_${room} switch)
+  cmake_dependent_option(${switch} "Build the extra ${room}" ON ABS_HIL_EXTRAS OFF)
+  if(NOT ${switch})
+    list(APPEND ABS_HIL_ROOMS_LEFT_OUT ${room})
+  endif()
+endforeach()
 set(room_lines "room\tholds\tmay know\n")
 set(ABS_HIL_ROOM_NAMES)
 foreach(row IN LISTS ABS_HIL_ROOM_TABLE)
@@ -29,13 +38,35 @@ foreach(row IN LISTS ABS_HIL_ROOM_TABLE)
   endforeach()
   list(APPEND ABS_HIL_ROOM_NAMES ${room})
 endforeach()
+list(REMOVE_ITEM ABS_HIL_ROOM_NAMES ${ABS_HIL_ROOMS_LEFT_OUT})
 file(WRITE ${CMAKE_BINARY_DIR}/rooms.tsv "${room_lines}")
+
+# The folder of a room's sources.
+function(abs_hil_room_sources result room)
+  if(room IN_LIST ABS_HIL_EXTRA_ROOMS)
+    set(${result} ${PROJECT_SOURCE_DIR}/extras/${room} PARENT_SCOPE)
+  else()
+    set(${result} ${PROJECT_SOURCE_DIR}/src/${room} PARENT_SCOPE)
+  endif()
+endfunction()
+
+# Adds the libraries of all rooms of this build but those given.
+macro(abs_hil_add_rooms)
+  foreach(room IN LISTS ABS_HIL_ROOM_NAMES)
+    if(room STREQUAL lcmtypes)
+      add_subdirectory(lcmtypes)
+    elseif(NOT room STREQUAL driver_sim AND NOT "${room}" IN_LIST ARGN)  # driver_sim comes with driver
+      abs_hil_room_sources(folder ${room})
+      add_subdirectory(${folder})
+    endif()
+  endforeach()
+endmacro()
 
 # The include folder of one room.
 function(abs_hil_room_folder room)
   set(folder ${ABS_HIL_ROOM_FOLDERS}/${room})
   file(MAKE_DIRECTORY ${folder}/abs_hil)
-  set(sources ${PROJECT_SOURCE_DIR}/src/${room})
+  abs_hil_room_sources(sources ${room})
   set(headers ${PROJECT_SOURCE_DIR}/include/abs_hil/${room})
   if(EXISTS ${sources})
     file(CREATE_LINK ${sources} ${folder}/${room} SYMBOLIC)

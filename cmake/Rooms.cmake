@@ -10,7 +10,6 @@ set(ABS_HIL_ROOM_TABLE
   "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"
   "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`, `driver/hm2`), injected faults (`driver/injection`) | rig"
   "driver_sim | the simulated backend (`driver/sim`) | rig driver plant_sim"
-  "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
   "runtime | clocks, cyclic executive, command gate with its plausibility checks, rings, histograms, real-time set-up | rig driver"
   "experiment | sequence of phases, the logic of a run, commissioning | files rig control driver runtime"
   "lcmtypes | the message types, generated from `lcmtypes/*.lcm` | "
@@ -21,13 +20,20 @@ set(ABS_HIL_ROOM_TABLE
   "config | configuration keys from the option rows, files, experiment files: rows, reader, schema, plan, the merge to the settings of a run | files rig control plant_sim driver runtime experiment"
   "guardian | the guard of the outputs and its companions, the lease and the own guardian as a run sees them, the program abs_guardian | cli files rig control plant_sim driver runtime experiment lcmtypes telemetry config"
   "run | one run, put together from its settings in one place: driver, faults, plan, logic, gate, ring, metrics, in real time, in virtual time or cycle by cycle | files rig control plant_sim driver driver_sim runtime experiment analysis config"
-  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis version run_folder config run"
-  "commands | remote commands over LCM: authority, listener, sender | files rig control plant_sim driver runtime experiment config telemetry lcmtypes"
-  "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment analysis config run telemetry lcmtypes"
-  "interchange | what other tools bring or take: controllers from shared libraries, FMUs and agents, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
-  "program | what `abs_hil` decides between its command line and the other rooms | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run study commands replay interchange"
+  "program | what `abs_hil` decides between its command line and the other rooms | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run"
+  # The extras (extras/): what a laboratory may leave out. No room above includes one.
+  "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
+  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
+  "commands | remote commands over LCM: authority, listener, sender | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
+  "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
+  "interchange | what other tools bring or take: controllers from shared libraries, FMUs and agents, the process that runs them, plant and laws as FMUs | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
 set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files emulator guardian analysis run_folder diagnosis config study commands replay interchange program)
+
+# Rooms of extras/, each with a switch: -DABS_HIL_STUDY=OFF leaves one out, -DABS_HIL_EXTRAS=OFF all. Those with a part in the
+# program abs_hil define an `Extra` (src/program/extra.hpp).
+set(ABS_HIL_EXTRA_ROOMS emulator study commands replay interchange)
+set(ABS_HIL_EXTRAS_OF_PROGRAM study commands replay interchange)

@@ -16,7 +16,7 @@ FILES_SHOWN = 15
 
 def room_of(name):
     parts = pathlib.PurePath(name).parts
-    parts = parts[2:] if parts[0] == 'include' else parts[1:] if parts[0] == 'src' else parts
+    parts = parts[2:] if parts[0] == 'include' else parts[1:] if parts[0] in ('src', 'extras') else parts
     return '/'.join(parts[:2]) if parts[0] == 'driver' and len(parts) > 2 else parts[0]
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # lint.sh [CHECK...]: runs the static checks format, shell, python, cppcheck, tidy (default: all, quick ones first). Each
-# warning is an error. tidy checks every source of src/ and apps/ that has changed since its last clean check. lint.sh
+# warning is an error. tidy checks every source of src/, extras/ and apps/ that has changed since its last clean check. lint.sh
 # tidy FILE... checks the units of these files only.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
@@ -13,7 +13,7 @@ check_format() {
   git ls-files '*.cpp' '*.hpp' | xargs clang-format-16 --dry-run --Werror &&
     git ls-files '*.cpp' ':!tests/example_controller' | xargs awk '
       FNR == 1 && !/^\/\// { print FILENAME ": its first line does not say what it is for"; bad = 1 } END { exit bad }' &&
-    git ls-files 'src/*pp' 'apps/*pp' 'include/*pp' | xargs awk 'FNR == 1 { looked = 0 }
+    git ls-files 'src/*pp' 'extras/*pp' 'apps/*pp' 'include/*pp' | xargs awk 'FNR == 1 { looked = 0 }
       looked || /^(#|$|namespace|using|extern|}|")/ { next }
       { looked = 1; if ($0 !~ /^ *\/[\/*]/) { print FILENAME ": no sentence says what it is for"; bad = 1 } }
       END { exit bad }'
@@ -29,7 +29,7 @@ check_python() {
 
 check_cppcheck() {
   cppcheck --enable=warning,performance,portability --error-exitcode=1 --inline-suppr --quiet --std=c++20 --language=c++ \
-    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions --library=.cppcheck-library.xml -I include -I src -I third_party src apps
+    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions --library=.cppcheck-library.xml -I include -I src -I extras -I third_party src extras apps
 }
 
 check_tidy() {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: tidy.py [SOURCE...]
 
-Runs clang-tidy over src/ and apps/, or over the units that hold the given sources. Reads build/clang (scripts/build.sh
+Runs clang-tidy over src/, extras/ and apps/, or over the units that hold the given sources. Reads build/clang (scripts/build.sh
 clang), where several sources share a unit, because headers cost most of the time. The static analyzer checks functions
 of the main file only, so the script runs it on each source separately. ~/.cache/abs_hil/tidy remembers units without
 warnings by the content of all their includes; the script skips these. It prints each warning and ends with status 1 if
@@ -24,7 +24,7 @@ TIDY = 'clang-tidy-16'
 CACHE = pathlib.Path(os.environ.get('XDG_CACHE_HOME', pathlib.Path.home() / '.cache')) / 'abs_hil' / 'tidy'
 # A unit includes its sources on purpose.
 MATCHERS = ['--checks=-clang-analyzer-*,-bugprone-suspicious-include',
-            f'--header-filter=^{re.escape(str(ROOT))}/(include/abs_hil|src|apps|build/clang/rooms)/']
+            f'--header-filter=^{re.escape(str(ROOT))}/(include/abs_hil|src|extras|apps|build/clang/rooms)/']
 
 
 def units():

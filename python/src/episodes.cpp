@@ -17,7 +17,7 @@
 #include "array.hpp"
 #include "bindings.hpp"
 #include "run/run.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {
@@ -133,7 +133,7 @@ using Values = py::array_t<double, py::array::c_style | py::array::forcecast>;
 class Episodes {
  public:
   Episodes(std::size_t rigs, std::size_t threads)
-      : episodes_(rigs), threads_(threads > 0 ? threads : study::machine_threads()) {}
+      : episodes_(rigs), threads_(threads > 0 ? threads : run::machine_threads()) {}
 
   /// Begins a new episode of one rig. @param vary  what varies, by plant `index` of the series `seed`
   void reset(std::size_t rig, const py::dict& arguments, const std::string& vary, std::uint64_t seed,
@@ -152,7 +152,7 @@ class Episodes {
     }
     const double* action = actions.data();
     const py::gil_scoped_release release;
-    study::for_each_index(episodes_.size(), threads_, [&](std::size_t i) { at(i).step(action[i], cycles); });
+    run::for_each_index(episodes_.size(), threads_, [&](std::size_t i) { at(i).step(action[i], cycles); });
   }
   /// Steps one rig through the actions, for `cycles` control periods each.
   void replay(std::size_t rig, const Values& actions, int cycles) {

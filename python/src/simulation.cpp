@@ -20,7 +20,7 @@
 #include "interruptible.hpp"
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {
@@ -131,10 +131,10 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
   std::vector<std::string> errors(jobs.size());
   Interruptible loop(std::move(progress));
   loop.run([&] {
-    if (threads == 0) threads = study::machine_threads();
+    if (threads == 0) threads = run::machine_threads();
     std::vector<config::Settings> settings(typed.size());
     std::vector<std::string> unusable(typed.size());
-    study::for_each_index(typed.size(), threads, [&](std::size_t i) {
+    run::for_each_index(typed.size(), threads, [&](std::size_t i) {
       if (!in_python[i]) unusable[i] = refusal([&] { settings[i] = config::merged_settings(typed[i]); });
       loop.after(0, jobs.size());
     });

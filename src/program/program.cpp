@@ -17,7 +17,7 @@
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
-#include "interchange/foreign_controller.hpp"
+#include "program/extra.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/clean_text.hpp"
@@ -103,7 +103,9 @@ int checked(int argc, char** argv, std::span<const control::ControllerEntry> own
   try {
     refuse_odd_bytes(argc, argv);
     for (const control::ControllerEntry& entry : own) control::register_controller(entry);
-    interchange::register_foreign_controllers();
+    for (const program::Extra* extra : program::extras()) {
+      if (extra->begin != nullptr) extra->begin();
+    }
     return dispatch(argc, argv);
   } catch (const config::ConfigError& error) {
     return fail(program::exit_usage, error);

@@ -18,12 +18,13 @@
 
 #include "analysis/run_summary.hpp"
 #include "config/board_policy.hpp"
+#include "config/config_error.hpp"
 #include "config/plan.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
 #include "guardian/guardian_lease.hpp"
-#include "interchange/foreign_controller.hpp"
+#include "program/extra.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
 #include "program/signals.hpp"
@@ -55,81 +56,6 @@ void log_board_notes(const config::Settings& s, const driver::RigDriver& driver)
   for (const std::string& note : driver.notes()) spdlog::info("{}", note);
   if (const std::string note = driver::verification_note(s.driver); !note.empty()) spdlog::warn("{}", note);
 }
-
-/// A run's controller that comes from a file, if it does: where it runs, its trial, its part of the summary.
-class ForeignRun {
- public:
-  /// Decides where the code will run. Call it before the controller is made.
-  explicit ForeignRun(const config::Settings& s) : on_rig_(s.on_rig()) {
-    interchange::set_home(on_rig_ ? interchange::Home::this_process : interchange::Home::own_process,
-                          s.unsafe.foreign_files);
-  }
-
-  /// Takes note of the controller, which must outlive this object. With `try_out` tries it out for a run in real time,
-  /// and logs what real-time code must not do. Throws std::invalid_argument if it cannot run at this rate.
-  void look_at(control::SlipController& controller, bool try_out) {
-    controller_ = dynamic_cast<interchange::ForeignController*>(&controller);
-    if (controller_ == nullptr) return;
-    sha256_ = run_folder::sha256_of_file(controller_->source());
-    if (try_out) log_trial(trial_.emplace(controller_->try_out()));
-  }
-
-  /// For the summary; null if the controller does not come from a file.
-  [[nodiscard]] nlohmann::ordered_json summary() const {
-    if (controller_ == nullptr) return nullptr;
-    const rig::DurationQuantiles steps = controller_->step_times().summary();
-    nlohmann::ordered_json json{{"file", controller_->file()},
-                                {"sha256", sha256_},
-                                {"own_process", !on_rig_},
-                                {"steps", controller_->step_times().count()},
-                                {"step_us",
-                                 {{"p50", steps.p50_us},
-                                  {"p99", steps.p99_us},
-                                  {"p99_9", steps.p99_9_us},
-                                  {"max", us(controller_->step_times().max_ns())}}}};
-    if (trial_) {
-      json["trial"] = {{"steps", trial_->times.steps},
-                       {"step_us",
-                        {{"p50", us(trial_->times.median_ns)},
-                         {"p99", us(trial_->times.p99_ns)},
-                         {"max", us(trial_->times.worst_ns)}}},
-                       {"allocations", trial_->offences.allocations},
-                       {"system_calls", trial_->offences.system_calls},
-                       {"died_without_system_calls", trial_->died_without_system}};
-    }
-    if (const std::string why = controller_->failure(); !why.empty()) json["failure"] = why;
-    return json;
-  }
-
- private:
-  static double us(std::int64_t duration_ns) { return 1e-3 * static_cast<double>(duration_ns); }
-
-  void log_trial(const interchange::ForeignTrial& trial) const {
-    const interchange::Offences& found = trial.offences;
-    if (found.allocations > 0) {
-      spdlog::warn("controller {}: {} allocations in {} trial steps: an allocation can wait for a lock",
-                   controller_->file(), found.allocations, trial.times.steps);
-    }
-    if (found.system_calls > 0) {
-      spdlog::warn(
-          "controller {}: {} system calls in {} trial steps, the first one number {}: the kernel can delay them",
-          controller_->file(), found.system_calls, trial.times.steps, found.first_system_call);
-    }
-    if (trial.died_without_system) {
-      spdlog::warn(
-          "controller {}: it died in a trial in which its system calls failed: it needs them, and the kernel can "
-          "delay them",
-          controller_->file());
-    }
-    spdlog::info("controller {}: steps took {:.1f} us at most in a trial of {}", controller_->file(),
-                 us(trial.times.worst_ns), trial.times.steps);
-  }
-
-  bool on_rig_;
-  interchange::ForeignController* controller_{nullptr};
-  std::string sha256_{};
-  std::optional<interchange::ForeignTrial> trial_{};
-};
 
 /// Puts the questions of a run's phases to the terminal and hands Enter to the run. For the slow thread.
 class Questions {
@@ -219,12 +145,12 @@ void require_own_guardian(const driver::DriverOptions& board) {
 /// Writes the run's files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
 int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& outcome, RunOutputs& outputs,
-             RunMonitor& run_monitor, const std::string& lost, const ForeignRun& foreign) {
+             RunMonitor& run_monitor, const std::string& lost) {
   if (!outcome.safe_state.ok()) {
     spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
                   driver::error_text(outcome.safe_state), run.driver().what_holds_unsafe());
   }
-  analysis::RunSummary summary = run::summarise(run, outcome, foreign.summary());
+  analysis::RunSummary summary = run::summarise(run, outcome, outputs.controller_facts());
   summary.config = nlohmann::ordered_json::parse(request.json);
   summary.publish_failures = outputs.publish_failures();
   summary.csv_rows_lost = outputs.csv_rows_lost();
@@ -292,6 +218,20 @@ void require_resources(run::Run& run, bool has_lease) {
   if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
 }
 
+std::vector<std::unique_ptr<RunPart>> run_parts(const RunRequest& request) {
+  if (request.settings.commands.enabled &&
+      std::ranges::find(extras(), std::string_view("commands"), &Extra::name) == extras().end()) {
+    throw config::ConfigError(
+        "commands.enabled = true, but this abs_hil was built without the extra \"commands\"; leave the key out, or build "
+        "with -DABS_HIL_COMMANDS=ON");
+  }
+  std::vector<std::unique_ptr<RunPart>> parts;
+  for (const Extra* extra : extras()) {
+    if (extra->join != nullptr) parts.push_back(extra->join(request));
+  }
+  return parts;
+}
+
 int run(const RunRequest& request) {
   const config::Settings& s = request.settings;
   const bool virtual_time = request.virtual_time;
@@ -302,11 +242,11 @@ int run(const RunRequest& request) {
   for (const std::string& problem : config::beyond_limits(prepared.plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
   for (const std::string& problem : config::certain_faults(prepared.plan, s)) spdlog::warn("{}", problem);
-  ForeignRun foreign(s);
+  std::vector<std::unique_ptr<RunPart>> parts = run_parts(request);
   run::Run run(prepared, {.real_time = !virtual_time, .overruns = overruns_of(s, virtual_time)});
   require_resources(run, lease != nullptr);
-  foreign.look_at(run.controller(), run.real_time());
-  RunOutputs outputs(request, run);
+  for (const auto& part : parts) part->attach(run);
+  RunOutputs outputs(request, run, std::move(parts));
   TimingMessages timing(run);
   // Beside a board the guardian ends a run whose cycle stands still.
   if (!s.on_rig() || virtual_time) run.watch_for_slow_cycles();
@@ -343,7 +283,7 @@ int run(const RunRequest& request) {
   if (!outcome.ran) throw driver::Unavailable(realtime_refusal(outcome.realtime));
   if (signals) signals->allow_leaving();
   if (request.stop_was_sent && outputs.stop_requested()) request.stop_was_sent();
-  return conclude(request, run, outcome, outputs, run_monitor, lost, foreign);
+  return conclude(request, run, outcome, outputs, run_monitor, lost);
 }
 
 }  // namespace abs_hil::program

@@ -4,6 +4,7 @@
 #include <fmt/chrono.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
@@ -21,7 +22,8 @@ constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
 constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
-RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
+RunOutputs::RunOutputs(const RunRequest& request, run::Run& run, std::vector<std::unique_ptr<RunPart>> parts)
+    : run_(run), parts_(std::move(parts)) {
   // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
   // network at once, so publish only if --lcm-url is given.
   if (!request.outputs.no_lcm && (!request.virtual_time || request.outputs.lcm_url)) {
@@ -40,7 +42,7 @@ RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
   if (!log_.empty() || lcm_) open_stream(request);
   if (run.real_time() && !request.in_series) status_line_.emplace([this] { return snapshot(); });
   run.record_into(sinks());
-  listen();
+  for (const auto& part : parts_) part->listen();
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs, bool virtual_time) {
@@ -93,9 +95,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    if (!request.virtual_time) remote_commands_.emplace(s, *stream_, run_.names());
-    // This runs in the listening thread: the next cycle sees the request.
-    command_listener_.emplace(*lcm_, *stream_, [this] { run_.request_stop(rig::Reason::stop_command); });
+    for (const auto& part : parts_) part->open(*lcm_, *stream_);
   }
 }
 
@@ -104,26 +104,27 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
   for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
   if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
-  // Behind the stream, because its messages refer to the record that the stream has just received.
-  if (remote_commands_) sinks.push_back(&*remote_commands_);
+  // Behind the stream, because their messages refer to the record that the stream has just received.
+  for (const auto& part : parts_) {
+    if (rig::RecordSink* sink = part->sink()) sinks.push_back(sink);
+  }
   if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
   return sinks;
 }
 
-void RunOutputs::listen() {
-  if (!remote_commands_ || !command_listener_ || !stream_) return;
-  remote_commands_->set_mailbox(run_.adjustments());
-  remote_commands_->set_listener(*command_listener_);
-  command_listener_->set_judge([this](const command_t& command) { return remote_commands_->judge(command); });
-  command_listener_->listen();
-  stream_->set_before_end([this] {
-    command_listener_->finish();
-    remote_commands_->refuse_pending();
-  });
+void RunOutputs::poll() {
+  for (const auto& part : parts_) part->poll();
 }
 
-void RunOutputs::poll() {
-  if (command_listener_) command_listener_->poll();
+bool RunOutputs::stop_requested() const {
+  return std::ranges::any_of(parts_, [](const auto& part) { return part->stop_requested(); });
+}
+
+nlohmann::ordered_json RunOutputs::controller_facts() const {
+  for (const auto& part : parts_) {
+    if (nlohmann::ordered_json facts = part->controller_facts(); !facts.is_null()) return facts;
+  }
+  return nullptr;
 }
 
 std::uint64_t RunOutputs::csv_rows_lost() const {

@@ -1,15 +1,15 @@
 #pragma once
 
 #include <list>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/run_summary.hpp"
-#include "commands/command_listener.hpp"
-#include "commands/remote_commands.hpp"
 #include "files/result_file.hpp"
 #include "program/command_line.hpp"
+#include "program/extra.hpp"
 #include "run/run.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
@@ -26,13 +26,15 @@ namespace abs_hil::program {
 class RunOutputs {
  public:
   /// The outputs of the run, which must outlive them: the run hands them its records, ABS_STATUS and the status line
-  /// show its state, and remote commands act on it from here on. Throws config::ConfigError for files and folders that
+  /// show its state, and the extras' parts act on it from here on. Throws config::ConfigError for files and folders that
   /// cannot be written, and telemetry::LcmError without a network.
-  RunOutputs(const RunRequest& request, run::Run& run);
+  RunOutputs(const RunRequest& request, run::Run& run, std::vector<std::unique_ptr<RunPart>> parts);
 
-  /// Handles remote commands from LCM.
+  /// Lets the extras' parts work.
   void poll();
-  [[nodiscard]] bool stop_requested() const { return command_listener_ && command_listener_->stop_requested(); }
+  [[nodiscard]] bool stop_requested() const;
+  /// What an extra knows of the run's controller; null: it brought none.
+  [[nodiscard]] nlohmann::ordered_json controller_facts() const;
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
   /// Writes summary and histogram if requested, and completes the run folder. Tries each, even after a failure. Returns
@@ -49,7 +51,6 @@ class RunOutputs {
   void open_folder(const RunRequest& request);
   void open_files(const OutputOptions& outputs, bool virtual_time);
   void open_stream(const RunRequest& request);
-  void listen();
 
   run::Run& run_;
   std::optional<run_folder::RunFolder> folder_;
@@ -62,8 +63,7 @@ class RunOutputs {
   std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;
   std::optional<telemetry::MessageStream> stream_;
-  std::optional<commands::RemoteCommands> remote_commands_;
-  std::optional<telemetry::CommandListener> command_listener_;
+  std::vector<std::unique_ptr<RunPart>> parts_;  // they use network and messages to their end
   std::optional<telemetry::StatusLine> status_line_;
 };
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <ctime>
@@ -16,18 +17,14 @@
 #include <thread>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "commands/authority.hpp"
-#include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
+#include "program/extra.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/clean_text.hpp"
+#include "run/parallel.hpp"
 #include "run_folder/series_folder.hpp"
-#include "study/parallel.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/lcm_url.hpp"
-#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::program {
 
@@ -128,55 +125,24 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
   return folder;
 }
 
-/// Receives commands between two runs.
-class StopListener {
- public:
-  explicit StopListener(const RunRequest& run)
-      : lcm_(run.outputs.lcm_url.value_or(telemetry::default_lcm_url())),
-        stream_({.channel_prefix = run.settings.telemetry.channel_prefix}, {}, {}),
-        commands_(lcm_, stream_, {}) {
-    stream_.add(lcm_);
-    const config::CommandOptions& commands = run.settings.commands;
-    if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
-    commands_.set_judge([](const command_t& command) {
-      const std::string shown = rig::clean_text(command.command, 64);
-      return telemetry::CommandAnswer{rig::Reason::command_not_now,
-                                      "refused '" + shown + "': only stop is accepted between two runs of a series"};
-    });
-    commands_.listen();
-  }
-
-  /// @param time_s  time since the pause began
-  [[nodiscard]] bool stop_heard(Clock::time_point now, double time_s) {
-    stream_.pass_time(std::chrono::nanoseconds(now.time_since_epoch()).count(), time_s);
-    if (!commands_.stop_requested()) {
-      commands_.poll();
-      return false;
-    }
-    commands_.finish();
-    return true;
-  }
-
- private:
-  telemetry::LcmOutlet lcm_;
-  telemetry::MessageStream stream_;
-  telemetry::CommandListener commands_;
-};
-
 /// Waits in real time between two runs of a series, so that the brake cools. A signal or a `stop` on the LCM network of
 /// `run` (not with --no-lcm) ends the wait. A stop is answered as during a run.
 /// @param run  the run that has ended
 /// @return the reason to end the series; `none` after the whole pause
 /// Throws telemetry::LcmError without a network.
 rig::Reason pause_between_runs(const RunRequest& run, double duration_s) {
-  std::optional<StopListener> listener;
-  if (!run.outputs.no_lcm) listener.emplace(run);
+  std::vector<std::unique_ptr<PauseListener>> listeners;
+  for (const Extra* extra : extras()) {
+    if (extra->pause != nullptr && !run.outputs.no_lcm) listeners.push_back(extra->pause(run));
+  }
   const auto start = Clock::now();
   while (true) {
     const auto now = Clock::now();
     const double time_s = std::chrono::duration<double>(now - start).count();
     if (signalled() != rig::Reason::none) return signalled();
-    if (listener && listener->stop_heard(now, time_s)) return rig::Reason::stop_command;
+    if (std::ranges::any_of(listeners, [&](const auto& one) { return one->stop_heard(now, time_s); })) {
+      return rig::Reason::stop_command;
+    }
     if (time_s >= duration_s) return rig::Reason::none;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
@@ -210,7 +176,7 @@ class SeriesRun {
   int run_all() {
     // In virtual time one run per processor at a time; on the rig one after the other.
     const bool at_once = base_.virtual_time && base_.settings.backend == "sim";
-    study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
+    run::for_each_index(left_.size(), at_once ? run::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
     if (interrupted_ == 0 && signalled() != rig::Reason::none) interrupted_ = status_of(signalled());
     cli::print("{}\n", in_words());

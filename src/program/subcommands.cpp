@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "program/extra.hpp"
 #include "rig/error_words.hpp"
 
 namespace abs_hil::program {
@@ -21,16 +22,12 @@ constexpr std::array table{
     Subcommand{"doctor", "check this computer and give a fix for each shortcoming", &add_doctor},
     Subcommand{"latency", "run the real-time cycle on the simulated rig and judge this computer's timing",
                &add_latency},
-    Subcommand{"compare", "compare controllers in simulation on the same varied plants", &add_compare},
-    Subcommand{"study", "simulate the runs that a file describes; repeat the command to go on after an interruption",
-               &add_study},
     Subcommand{"validate", "describe an experiment and check it against the limits", &add_validate},
     Subcommand{"commission", "first steps with a real rig; asks before each step", &add_commission},
     Subcommand{"init-rig", "write NAME.toml, the parameters of a rig of your own to fill in", &add_init_rig},
     Subcommand{"safe",
                "make the configured board, or every board found, safe and verify it; ends the run that drives it",
                &add_safe},
-    Subcommand{"replay", "feed a recorded run to its own or another controller, open loop", &add_replay},
     Subcommand{"log", "say what recordings hold: log info FILE"},
     Subcommand{"convert", "convert a recorded run to .csv, .mcap or .parquet, or record a running one"},
     Subcommand{"export-fmu",
@@ -38,7 +35,6 @@ constexpr std::array table{
     Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits"},
     Subcommand{"serve", "show a running experiment, or a recorded one, as a scope in the browser"},
     Subcommand{"lab", "make a page that simulates the rig and its controllers in the browser, without a server"},
-    Subcommand{"send", "send a command to a running abs_hil over LCM", &add_send},
     Subcommand{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     Subcommand{"tune", "search for a controller's gains in simulation"},
     Subcommand{"identify", "estimate the rig's parameters from its own logs, with intervals"},
@@ -49,7 +45,14 @@ constexpr std::array table{
 
 }  // namespace
 
-std::span<const Subcommand> subcommands() noexcept { return table; }
+const std::vector<Subcommand>& subcommands() {
+  static const std::vector<Subcommand> all = [] {
+    std::vector<Subcommand> rows(table.begin(), table.end());
+    for (const Extra* extra : extras()) rows.insert(rows.end(), extra->subcommands.begin(), extra->subcommands.end());
+    return rows;
+  }();
+  return all;
+}
 
 std::optional<int> start_python_program(int argc, char** argv) {
   if (argc < 2) return std::nullopt;

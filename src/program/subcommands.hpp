@@ -29,7 +29,7 @@ using Words = std::vector<std::string>;
 /// What a subcommand does after the command line is read. Returns the exit status. Throws what program.cpp catches.
 using Action = std::function<int()>;
 
-/// One row of the table of subcommands (subcommands.cpp). `abs_hil --help`, the shell's completion and the search for
+/// One row of the table of subcommands (subcommands.cpp, and those of the extras). `abs_hil --help`, the shell's completion and the search for
 /// the nearest name are made from it.
 struct Subcommand {
   std::string_view name;
@@ -37,7 +37,7 @@ struct Subcommand {
   /// Adds the options to the subcommand's parser. Null: `abs_hil NAME` starts abs_NAME, a program in Python.
   Action (*add)(cli::Parser& parser, const Words& words){nullptr};
 };
-[[nodiscard]] std::span<const Subcommand> subcommands() noexcept;
+[[nodiscard]] const std::vector<Subcommand>& subcommands();
 
 /// If the first argument names a program in Python, it takes this process over with the other arguments. Returns the
 /// exit status if that fails, after a message that says what to install; nothing for any other first argument.
@@ -50,14 +50,10 @@ struct Subcommand {
 Action add_list(cli::Parser& parser, const Words& words);
 Action add_doctor(cli::Parser& parser, const Words& words);
 Action add_latency(cli::Parser& parser, const Words& words);
-Action add_compare(cli::Parser& parser, const Words& words);
-Action add_study(cli::Parser& parser, const Words& words);
 Action add_validate(cli::Parser& parser, const Words& words);
 Action add_commission(cli::Parser& parser, const Words& words);
 Action add_init_rig(cli::Parser& parser, const Words& words);
 Action add_safe(cli::Parser& parser, const Words& words);
-Action add_replay(cli::Parser& parser, const Words& words);
-Action add_send(cli::Parser& parser, const Words& words);
 
 /// Runs an experiment and returns the exit status. Throws what its parts throw: see program.cpp.
 int run(const RunRequest& request);

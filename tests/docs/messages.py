@@ -16,7 +16,7 @@ QUOTED = re.compile(r'^\| `([^`]+)`', re.MULTILINE)
 
 def texts(root):
     """All sources; literals that the compiler or Python joins are joined."""
-    files = [file for folder in ('src', 'include', 'python/abs_hil', 'apps') for file in sorted((root / folder).rglob('*'))
+    files = [file for folder in ('src', 'extras', 'include', 'python/abs_hil', 'apps') for file in sorted((root / folder).rglob('*'))
              if file.suffix in ('.cpp', '.hpp', '.py')]
     whole = '\n'.join(file.read_text(encoding='utf-8') for file in files)
     whole = re.sub(r'"\s*\\?\n\s*"', '', whole)

@@ -19,7 +19,7 @@ import tempfile
 
 #: of all pages together. Say each thing once; long tables are CSV files of docs/reference.
 WORDS_AT_MOST = 60_000
-FOLDERS = ('src', 'include', 'apps', 'python', 'tests', 'research', 'scripts', 'lcmtypes', 'firmware', 'examples', 'cmake',
+FOLDERS = ('src', 'extras', 'include', 'apps', 'python', 'tests', 'research', 'scripts', 'lcmtypes', 'firmware', 'examples', 'cmake',
            'packaging', 'completion', 'config', 'bench', '.ci')
 FILES = ('CMakeLists.txt', 'CMakePresets.json', 'pyproject.toml')
 TOP = (*FOLDERS, 'docs', 'third_party')
@@ -100,7 +100,7 @@ class Sources:
             known = span in self.keys or any(key.startswith(span.rstrip('.') + '.') for key in self.keys)
             return None if known else 'no configuration key'
         if FILE.match(span) and (span.split('/')[0] in TOP and '/' in span or span.endswith(ENDINGS) and span not in ENDINGS):
-            folders = (self.root, self.root / 'src', self.root / 'include' / 'abs_hil', self.root / 'include', page.parent)
+            folders = (self.root, self.root / 'src', self.root / 'extras', self.root / 'include' / 'abs_hil', self.root / 'include', page.parent)
             found = any((folder / span).exists() for folder in folders)
             return None if found or ('/' not in span and span in self.names) else 'no such file'
         if is_code(span):

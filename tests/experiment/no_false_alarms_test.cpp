@@ -14,7 +14,7 @@
 #include "injected_run.hpp"
 #include "simulated_run.hpp"
 #include "study/batch.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/variation.hpp"
 
 using namespace abs_hil;
@@ -271,7 +271,7 @@ TEST_CASE("5,000 paper's experiments on rigs as measured trip no check", "[.meas
   std::vector<rig::Reason> own(runs);
   std::vector<rig::Reason> by_session(runs);
   std::vector<rig::Reason> by_default(runs);
-  study::for_each_index(runs, 2, [&](std::size_t i) {
+  run::for_each_index(runs, 2, [&](std::size_t i) {
     const config::Settings& s = settings[i % settings.size()];
     const study::Perturbation drawn = study::draw(variation, 62, i);
     const plant_sim::PlantOptions plant = study::perturbed(s.plant, drawn);

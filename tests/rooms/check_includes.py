@@ -6,7 +6,7 @@ compiler cannot find: includes of the backend `driver/sim`, which is in the fold
 does not link; of clocks, threads and files in rooms that only compute; of private headers in public ones; of what a driver
 knows about its board in the emulators' program, which has to know it by itself.
 
-usage: check_includes.py ROOT ROOMS.TSV              checks ROOT/include/abs_hil and ROOT/src
+usage: check_includes.py ROOT ROOMS.TSV              checks include/abs_hil, src and extras of ROOT
        check_includes.py ROOT ROOMS.TSV --self-test  plants one offence of each kind and checks that each is found
 """
 import pathlib
@@ -24,6 +24,7 @@ LIBRARIES = {
 PURE = {'rig', 'control', 'plant_sim'}
 # What the emulators' program may have of the drivers: nothing about a board
 OF_DRIVERS = {'driver/file_descriptor.hpp', 'driver/monotonic_time.hpp'}
+EXTRAS = {'emulator', 'study', 'commands', 'replay', 'interchange'}
 IMPURE_HEADER = re.compile(r'^(chrono|ctime|time\.h|thread|mutex|fstream|iostream|filesystem|unistd\.h|fcntl\.h|sys/.*)$')
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
@@ -34,7 +35,7 @@ def read_rooms(table):
 
 
 def room_of(relative):
-    """Room of a path below include/abs_hil or src."""
+    """Room of a path below include/abs_hil, src or extras."""
     return 'driver_sim' if relative.parts[:2] == ('driver', 'sim') else relative.parts[0]
 
 
@@ -48,15 +49,18 @@ def room_of_include(name, rooms):
 
 def linked_by(root, room):
     """What the room's CMakeLists.txt says, to look for names of libraries in it."""
-    folder = root / 'src' / ('driver' if room == 'driver_sim' else room) / 'CMakeLists.txt'
-    return folder.read_text() if folder.exists() else ''
+    name = 'driver' if room == 'driver_sim' else room
+    files = [root / top / name / 'CMakeLists.txt' for top in ('src', 'extras')]
+    return next((file.read_text() for file in files if file.exists()), '')
 
 
 def offences(root, rooms):
     found = []
-    for base in (root / 'include' / 'abs_hil', root / 'src'):
+    for base in (root / 'include' / 'abs_hil', root / 'src', root / 'extras'):
         for file in sorted(base.rglob('*.[ch]pp')):
             room = room_of(file.relative_to(base))
+            if file.relative_to(base).parts[1].startswith('abs_'):
+                continue  # a program of an extra, which uses what programs use
             if room not in rooms:
                 found.append(f'{file}: room "{room}" is not in cmake/Rooms.cmake')
                 continue
@@ -77,7 +81,7 @@ def offences(root, rooms):
                     found.append(f'{place}: room {room} must not know {other}: {name}')
                 elif base.name == 'abs_hil' and not name.startswith('abs_hil/'):
                     found.append(f'{place}: a public header must not need a private one: {name}')
-    for file in sorted((root / 'apps/abs_rig_emulator').rglob('*.[ch]pp')):
+    for file in sorted((root / 'extras/emulator/abs_rig_emulator').rglob('*.[ch]pp')):
         names = re.findall(r'^#include "((?:abs_hil/)?driver/[^"]+)"', file.read_text(), re.MULTILINE)
         found += [f'{file}: an emulator must know its board by itself: {name}' for name in names if name not in OF_DRIVERS]
     return found
@@ -85,12 +89,12 @@ def offences(root, rooms):
 
 def self_test(rooms):
     """Plants every kind of offence. Returns those that the check does not find."""
-    planted = [(f'src/{"driver/sim" if room == "driver_sim" else room}', f'{other}/anything.hpp')
+    planted = [(f'{"extras" if room in EXTRAS else "src"}/{"driver/sim" if room == "driver_sim" else room}', f'{other}/anything.hpp')
                for room, known in rooms.items() for other in rooms
                if other != room and other not in known and other not in ('driver_sim', 'lcmtypes')]
     planted += [('src/experiment', 'driver/sim/sim_driver.hpp'), ('src/control', 'chrono'), ('src/control', 'fmt/format.h'),
                 ('src/driver', 'lcm/lcm-cpp.hpp'), ('src/report', 'abs_hil/event_t.hpp'), ('src/nowhere', 'vector'),
-                ('include/abs_hil/control', 'control/adaptive_gains.hpp'), ('apps/abs_rig_emulator', 'driver/pci/wire.hpp')]
+                ('include/abs_hil/control', 'control/adaptive_gains.hpp'), ('extras/emulator/abs_rig_emulator', 'driver/pci/wire.hpp')]
     missed = []
     for folder, include in planted:
         with tempfile.TemporaryDirectory() as copy:

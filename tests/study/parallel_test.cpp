@@ -1,5 +1,5 @@
 // Calling a function for many indices from several threads.
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 
 #include <atomic>
 #include <stdexcept>
@@ -12,10 +12,10 @@ using namespace abs_hil::study;
 TEST_CASE("each index is called once, with any number of threads") {
   for (const std::size_t threads : {0U, 1U, 2U, 7U, 64U}) {
     std::vector<std::atomic<int>> calls(50);
-    for_each_index(calls.size(), threads, [&](std::size_t i) { ++calls[i]; });
+    run::for_each_index(calls.size(), threads, [&](std::size_t i) { ++calls[i]; });
     for (const auto& count : calls) CHECK(count == 1);
   }
-  for_each_index(0, 4, [](std::size_t) { FAIL("there is nothing to call it for"); });
+  run::for_each_index(0, 4, [](std::size_t) { FAIL("there is nothing to call it for"); });
 }
 
 TEST_CASE("an exception ends the series and reaches the caller") {
@@ -24,7 +24,7 @@ TEST_CASE("an exception ends the series and reaches the caller") {
     ++calls;
     if (i == 3) throw std::runtime_error("third");
   };
-  CHECK_THROWS_WITH(for_each_index(1'000'000, 1, task), "third");
+  CHECK_THROWS_WITH(run::for_each_index(1'000'000, 1, task), "third");
   CHECK(calls == 4);
-  CHECK_THROWS_WITH(for_each_index(1'000'000, 4, task), "third");
+  CHECK_THROWS_WITH(run::for_each_index(1'000'000, 4, task), "third");
 }

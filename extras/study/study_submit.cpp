@@ -14,7 +14,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
-#include "program/study_command.hpp"
+#include "study/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "rig/clean_text.hpp"
 #include "rig/error_words.hpp"

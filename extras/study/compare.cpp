@@ -24,11 +24,11 @@
 #include "driver/spawn.hpp"
 #include "program/command_line.hpp"
 #include "program/signals.hpp"
-#include "program/study_command.hpp"
+#include "study/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/runs.hpp"
 
 namespace abs_hil::program {
@@ -192,7 +192,7 @@ std::vector<study::Outcome> outcomes_of(const study::Study& study, std::size_t t
   std::atomic<std::size_t> finished{0};
   RunProgress progress;
   run_part(
-      study, study.runs(), threads > 0 ? threads : study::machine_threads(), [](std::size_t index) { return index; },
+      study, study.runs(), threads > 0 ? threads : run::machine_threads(), [](std::size_t index) { return index; },
       [&](std::size_t index, study::Outcome outcome) {
         if (!outcome.refusal.empty()) throw std::invalid_argument(outcome.refusal);
         outcomes[index] = std::move(outcome);

@@ -14,7 +14,7 @@
 #include "config/script.hpp"
 #include "rig/formatted_text.hpp"
 #include "run/run_summary.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 #include "study/runs.hpp"
 
 namespace abs_hil::study {
@@ -149,7 +149,7 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
   const std::uint64_t at_once = std::max<std::uint64_t>(1, runs_at_once / study.script().chunk);
   for (std::size_t at = 0; at < chunks.size(); at += at_once) {
     compute_together(study, folder, std::span(chunks).subspan(at, std::min<std::size_t>(at_once, chunks.size() - at)),
-                     threads > 0 ? threads : machine_threads(), counts, tell);
+                     threads > 0 ? threads : run::machine_threads(), counts, tell);
   }
   return {.earlier = earlier,
           .runs = counts.runs,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/command_line.hpp"
+#include "program/subcommands.hpp"
 #include "study/study.hpp"
 
 namespace abs_hil::program {
@@ -33,6 +34,9 @@ struct StudyCommand {
   std::vector<std::string> sbatch{};
   cli::Parser submit{};
 };
+
+Action add_compare(cli::Parser& parser, const Words& words);
+Action add_study(cli::Parser& parser, const Words& words);
 
 /// Repeats one run of a study with everything recorded in a run folder, as `abs_hil --fast --out FOLDER` does: from the
 /// beginning to the end of its experiment. Its config.toml repeats it once more. Returns the run's exit status.

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace abs_hil::study {
+namespace abs_hil::run {
 
 /// Calls `task(0) ... task(count - 1)` from `threads` threads (at least one), each index once, in any order, and
 /// returns when all are done. After an exception it starts no new index and rethrows the exception with the lowest
@@ -47,4 +47,4 @@ inline void for_each_index(std::size_t count, std::size_t threads, const std::fu
   return std::max(1U, std::thread::hardware_concurrency());
 }
 
-}  // namespace abs_hil::study
+}  // namespace abs_hil::run

@@ -56,8 +56,6 @@ int send(const SendOptions& options) {
   return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;
 }
 
-}  // namespace
-
 Action add_send(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<SendOptions>();
   parser.add("order", &o->order, "stop | start | continue | slip-ref X | gain NAME X",
@@ -69,5 +67,10 @@ Action add_send(cli::Parser& parser, const Words&) {
              {.type = "S", .range = {0.1, 60.0}, .show_default = true});
   return [o] { return send(*o); };
 }
+
+}  // namespace
+
+extern const Subcommand send_row;
+constinit const Subcommand send_row{"send", "send a command to a running abs_hil over LCM", &add_send};
 
 }  // namespace abs_hil::program

@@ -1,16 +1,18 @@
 // `abs_hil study` with merge, status and submit, and the progress of many runs.
-#include "program/study_command.hpp"
+#include "study/study_command.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "config/config_error.hpp"
+#include "program/extra.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
@@ -221,5 +223,15 @@ void RunProgress::show(std::uint64_t done, std::uint64_t all) {
   cli::print(stderr, "\r\033[K{} of {} runs{}", done, all, left);
   std::fflush(stderr);
 }
+
+namespace {
+constexpr std::array rows{
+    Subcommand{"compare", "compare controllers in simulation on the same varied plants", &add_compare},
+    Subcommand{"study", "simulate the runs that a file describes; repeat the command to go on after an interruption",
+               &add_study}};
+}  // namespace
+
+extern const Extra study_extra;
+constinit const Extra study_extra{.name = "study", .subcommands = rows};
 
 }  // namespace abs_hil::program

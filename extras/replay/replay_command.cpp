@@ -7,7 +7,7 @@
 
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
-#include "program/subcommands.hpp"
+#include "program/extra.hpp"
 #include "replay/replay.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
@@ -75,8 +75,6 @@ int replay_run(const ReplayCommand& command) {
   return exit_completed;
 }
 
-}  // namespace
-
 Action add_replay(cli::Parser& parser, const Words&) {
   const auto o = std::make_shared<ReplayCommand>();
   parser.add("recording", &o->recording, "event log (--log) or run folder (--out); LOG#2: the second run of a log",
@@ -90,5 +88,12 @@ Action add_replay(cli::Parser& parser, const Words&) {
              {.type = "FILE.csv", .excludes = {"--check"}});
   return [o] { return replay_run(*o); };
 }
+
+constexpr Subcommand row{"replay", "feed a recorded run to its own or another controller, open loop", &add_replay};
+
+}  // namespace
+
+extern const Extra replay_extra;
+constinit const Extra replay_extra{.name = "replay", .subcommands = {&row, 1}};
 
 }  // namespace abs_hil::program

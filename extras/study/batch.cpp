@@ -12,7 +12,7 @@
 
 #include "config/config_error.hpp"
 #include "study/lanes/lane_jobs.hpp"
-#include "study/parallel.hpp"
+#include "run/parallel.hpp"
 
 namespace abs_hil::study {
 
@@ -93,7 +93,7 @@ BatchCounts run_batch(std::size_t count, std::size_t threads, const std::functio
   std::atomic<std::size_t> in_lanes{0};
   std::atomic<std::size_t> disturbed{0};
   std::atomic<std::size_t> scalar{0};
-  for_each_index((count + together - 1) / together, threads, [&](std::size_t part_index) {
+  run::for_each_index((count + together - 1) / together, threads, [&](std::size_t part_index) {
     const JobSource job_of = new_source();
     Part part(set, take);
     const std::size_t end = std::min(count, (part_index + 1) * together);
