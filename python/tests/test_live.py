@@ -15,7 +15,8 @@ RECEIVER = '''
 import subprocess, sys, abs_hil
 messages = abs_hil.live(timeout_s=20)
 first_of_other = abs_hil.live(channel='EXPERIMENT', timeout_s=20)
-run = subprocess.Popen([sys.argv[1], '--backend', 'sim', '--rt', 'off', '--no-out', '--csv', sys.argv[2], '--set',
+run = subprocess.Popen([sys.argv[1], '--backend', 'sim', '--rt', 'off', '--no-out', '--set', 'realtime.cycle_gap_max_s=10',
+                        '--csv', sys.argv[2], '--set',
                         'experiment.start_speed_rad_s=40'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 experiment = next(first_of_other)
 seen = []

@@ -101,7 +101,7 @@ def watch_a_run(screen, folder, environment, lcm_jar, picture):
         command = pathlib.Path(f'/proc/{spy.pid}/cmdline').read_text()
         assert lcm_jar in command, f'{lcm_jar} is not the one in use: {command}'
         # The paper's braking after 5.2 s, and enough before it.
-        run = subprocess.Popen([PROGRAM, '--backend', 'sim'], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=folder)
+        run = subprocess.Popen([PROGRAM, '--backend', 'sim', '--set', 'realtime.cycle_gap_max_s=10'], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=folder)
         row = windows.until('ABS_TELEMETRY decoded at 1 kHz', 6, lambda: at_full_rate(windows))
         print(f"  ABS_TELEMETRY is a {row['Type']}, {row['Hz']} Hz")
         undecoded = [c for c, row in windows.channels().items() if c.startswith('ABS_') and row['Type'].startswith('??')]

@@ -19,6 +19,8 @@ import sys
 import tempfile
 import time
 
+from live import PATIENT
+
 GROUP, PORT = '239.255.76.67', 7667
 SHORT, LONG = 0x4C433032, 0x4C433033  # LCM's packets: whole messages, fragments
 CYCLE_NS = 1_000_000
@@ -92,7 +94,7 @@ def events_of(path):
 class Run:
     def __init__(self, folder, *options):
         self.log = pathlib.Path(folder, f'{time.monotonic_ns()}.lcmlog')
-        self.process = subprocess.Popen([PROGRAM, '--log', self.log, *options], stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([PROGRAM, *PATIENT, '--log', self.log, *options], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True)
         time.sleep(1.5)
 
@@ -287,7 +289,7 @@ def series(folder, key):
         return [run['status'] for run in json.loads((out / 'series.json').read_text())['runs']]
 
     def begin():
-        return subprocess.Popen([PROGRAM, '--rt', 'off', '--experiment', script, '--out', out, '--set',
+        return subprocess.Popen([PROGRAM, *PATIENT, '--rt', 'off', '--experiment', script, '--out', out, '--set',
                                  'commands.enabled=true', *KEY], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def wait_for(holds, what):

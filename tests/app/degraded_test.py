@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 LOG_SYNC = 0xEDA1DA01
 # The simulated rig in real time, for a few seconds.
@@ -38,7 +38,7 @@ class Degraded(ProgramTest):
         for option in ('--csv', '--log'):
             with self.subTest(option):
                 path, summary = self.folder / 'record', self.folder / 'summary.json'
-                result = self.run_program('--no-lcm', option, path, '--summary', summary,
+                result = self.patient('--no-lcm', option, path, '--summary', summary,
                                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
                 self.assertEqual(result.returncode, 1, result.stderr)
                 self.assertIn(str(path), result.stderr)
@@ -62,7 +62,7 @@ class Degraded(ProgramTest):
             time.sleep(0.02)
 
     def start(self, *args):
-        program = subprocess.Popen([os.path.abspath(PROGRAM), *map(str, args)], stdout=subprocess.PIPE,
+        program = subprocess.Popen([os.path.abspath(PROGRAM), *PATIENT, *map(str, args)], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         self.addCleanup(lambda: program.poll() is None and (program.kill(), program.communicate()))
         return program

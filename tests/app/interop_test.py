@@ -18,6 +18,8 @@ import tempfile
 import threading
 import time
 
+from live import PATIENT
+
 URL = 'udpm://239.255.76.67:7667?ttl=0'
 CHANNELS = {'ABS_TELEMETRY': 'telemetry_t', 'ABS_STATUS': 'status_t', 'ABS_EVENT': 'event_t',
             'ABS_EXPERIMENT': 'experiment_t'}
@@ -113,7 +115,7 @@ def recorded_live_and_replayed(program, folder):
     live = Subscriber(None)
     try:
         wait_for_listeners(2)
-        run = subprocess.run([program, '--set', 'experiment.start_speed_rad_s=120', '--csv', f'{folder}/run.csv',
+        run = subprocess.run([program, *PATIENT, '--set', 'experiment.start_speed_rad_s=120', '--csv', f'{folder}/run.csv',
                               '--log', f'{folder}/own.lcmlog'], capture_output=True, text=True, timeout=60)
     finally:
         seen = live.finish()
@@ -156,7 +158,7 @@ def examples_of_the_page(program, module_dir, page, folder):
 
     live = subprocess.Popen([sys.executable, '-c', blocks['live'], URL], env=environment, stdout=subprocess.PIPE, text=True)
     wait_for_listeners(1)
-    subprocess.run([program, '--set', 'experiment.start_speed_rad_s=120'], check=True, capture_output=True, timeout=60)
+    subprocess.run([program, *PATIENT, '--set', 'experiment.start_speed_rad_s=120'], check=True, capture_output=True, timeout=60)
     text, _ = live.communicate(timeout=20)
     assert live.returncode == 0 and len(re.findall(r'^brake +slip [\d.]+  theta', text, re.M)) >= 1, text
     print('the examples of the page work')

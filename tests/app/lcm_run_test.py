@@ -14,6 +14,8 @@ import sys
 import tempfile
 import time
 
+from live import PATIENT
+
 URL = 'udpm://239.255.76.67:7667?ttl=0'
 LOG_SYNC = 0xEDA1DA01
 
@@ -53,7 +55,7 @@ def whole_run(program, folder):
     logger = subprocess.Popen([*urgent, 'lcm-logger', '-q', f'{folder}/seen.lcmlog'])
     try:
         wait_for_listener()
-        run = subprocess.run([program, '--set', 'experiment.start_speed_rad_s=120', '--summary', f'{folder}/s.json',
+        run = subprocess.run([program, *PATIENT, '--set', 'experiment.start_speed_rad_s=120', '--summary', f'{folder}/s.json',
                               '--log', f'{folder}/own.lcmlog'], capture_output=True, text=True, timeout=60)
         time.sleep(0.5)
     finally:
@@ -75,7 +77,7 @@ def whole_run(program, folder):
 
 
 def stopped_by_command(program, helper, folder):
-    run = subprocess.Popen([program, '--summary', f'{folder}/stop.json'], stdout=subprocess.PIPE,
+    run = subprocess.Popen([program, *PATIENT, '--summary', f'{folder}/stop.json'], stdout=subprocess.PIPE,
                            stderr=subprocess.PIPE, text=True)
     wait_for_listener()
     assert subprocess.run([helper, 'command', URL, 'stop'], timeout=20).returncode == 0

@@ -8,6 +8,8 @@ import sys
 import tempfile
 import unittest
 
+from live import PATIENT
+
 PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else 'build/release/bin/abs_hil'
 
 # Runs without a named destination write no run folder.
@@ -25,6 +27,10 @@ class ProgramTest(unittest.TestCase):
 
     def run_program(self, *args, **kwargs):
         return subprocess.run([PROGRAM, *map(str, args)], capture_output=True, text=True, timeout=60, **kwargs)
+
+    def patient(self, *args, **kwargs):
+        """A run in real time that must not judge this computer."""
+        return self.run_program(*PATIENT, *args, **kwargs)
 
     def fast(self, *args):
         """A run in virtual time that must complete."""

@@ -5,7 +5,7 @@ import subprocess
 import time
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 ASKS = '''
 [[phase]]
@@ -30,7 +30,7 @@ class Questions(ProgramTest):
         """A run in real time at a terminal of its own; returns it and the terminal."""
         master, slave = pty.openpty()
         self.addCleanup(os.close, master)
-        program = subprocess.Popen([PROGRAM, '--no-lcm', *map(str, args)], stdin=slave, stdout=subprocess.DEVNULL,
+        program = subprocess.Popen([PROGRAM, *PATIENT, '--no-lcm', *map(str, args)], stdin=slave, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE, text=True)
         os.close(slave)
         self.addCleanup(self.end, program)
@@ -78,7 +78,7 @@ class Questions(ProgramTest):
         for args in (('--fast',), ()):
             with self.subTest(args):
                 csv = self.folder / 'run.csv'
-                result = self.run_program('--no-lcm', *args, '--experiment', self.script(), '--csv', csv,
+                result = self.patient('--no-lcm', *args, '--experiment', self.script(), '--csv', csv,
                                           stdin=subprocess.DEVNULL)
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertEqual(result.stderr.count('answers the questions of experiment'), 1, result.stderr)

@@ -4,13 +4,13 @@ import subprocess
 import time
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 
 class RealTimeRun(ProgramTest):
     def test_braking_at_once(self):
         summary = self.folder / 'summary.json'
-        result = self.run_program('--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--summary', summary)
+        result = self.patient('--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--summary', summary)
         self.assertEqual(result.returncode, 0, result.stderr)
         s = self.summary(summary)
         self.assertEqual(s['result'], 'completed')
@@ -20,7 +20,7 @@ class RealTimeRun(ProgramTest):
 
     def stopped_by(self, number):
         csv, summary = self.folder / 'run.csv', self.folder / 'summary.json'
-        program = subprocess.Popen([PROGRAM, '--no-lcm', '--csv', csv, '--summary', summary],
+        program = subprocess.Popen([PROGRAM, *PATIENT, '--no-lcm', '--csv', csv, '--summary', summary],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(1.0)  # well within the acceleration
         program.send_signal(number)

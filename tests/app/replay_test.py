@@ -5,7 +5,7 @@ import resource
 import subprocess
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 
 class Replay(ProgramTest):
@@ -48,7 +48,7 @@ class Replay(ProgramTest):
 
     def test_the_log_of_a_killed_run_is_read_up_to_its_last_message(self):
         log, replayed = self.folder / 'run.lcmlog', self.folder / 'replayed.csv'
-        run = subprocess.Popen([PROGRAM, '--no-lcm', '--rt', 'off', '--log', log], stdout=subprocess.DEVNULL,
+        run = subprocess.Popen([PROGRAM, *PATIENT, '--no-lcm', '--rt', 'off', '--log', log], stdout=subprocess.DEVNULL,
                                stderr=subprocess.DEVNULL)
         while not log.exists() or log.stat().st_size < 100_000:
             self.assertIsNone(run.poll())
@@ -99,7 +99,7 @@ class Replay(ProgramTest):
 
     def test_real_time_run(self):
         log = self.folder / 'real.lcmlog'
-        self.run_program('--no-lcm', '--log', log, '--rt', 'off', '--set', 'experiment.cut_speed_rad_s=10', '--set',
+        self.patient('--no-lcm', '--log', log, '--rt', 'off', '--set', 'experiment.cut_speed_rad_s=10', '--set',
                          'experiment.accelerate_limit_s=0.5')  # ends with a fault, which the replay finds again
         result = self.run_program('replay', log, '--check')
         self.assertEqual(result.returncode, 0, result.stderr + result.stdout)

@@ -5,7 +5,7 @@ import json
 import os
 import unittest
 
-from program import ProgramTest
+from program import PATIENT, ProgramTest
 
 FILES = {'run.csv', 'run.lcmlog', 'summary.json', 'config.toml', 'environment.json', 'events.csv', 'SHA256SUMS'}
 
@@ -62,7 +62,7 @@ class RunFolder(ProgramTest):
         self.assertEqual(self.summary(out / 'summary.json')['result'], 'fault')
 
     def test_default_folder(self):
-        short = ['--no-lcm', '--rt', 'off', '--set', 'experiment.start_speed_rad_s=20']
+        short = [*PATIENT, '--no-lcm', '--rt', 'off', '--set', 'experiment.start_speed_rad_s=20']
         runs = self.folder / 'runs'
         env = {**os.environ, 'ABS_HIL_RUNS_DIR': str(runs)}
         for extra in (['--fast'], ['--no-out'], ['--csv', self.folder / 'x.csv']):

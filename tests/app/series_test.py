@@ -8,7 +8,7 @@ import subprocess
 import time
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 SHORT = '''
 [settings]
@@ -62,7 +62,7 @@ class Series(ProgramTest):
     def test_it_goes_on_where_it_was_interrupted(self):
         script = self.script(SHORT + '[series]\nrepeat = 4\npause_s = 0.2\n')
         out = self.folder / 'out'
-        command = [PROGRAM, '--no-lcm', '--rt', 'off', '--experiment', str(script), '--out', str(out)]
+        command = [PROGRAM, *PATIENT, '--no-lcm', '--rt', 'off', '--experiment', str(script), '--out', str(out)]
         program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 50
         while not (out / 'run-0001').exists() and time.monotonic() < deadline:

@@ -7,18 +7,18 @@ import sys
 import time
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 SIGNALS = ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129))
 
 
 class Stopping(ProgramTest):
-    def start(self, *args, **streams):
+    def start(self, *args, patience=PATIENT, **streams):
         """A run that accelerates; returns once the CSV shows that the motor is on."""
         self.csv, self.summary_file = self.folder / 'run.csv', self.folder / 'summary.json'
         self.csv.unlink(missing_ok=True)
         streams = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, **streams}
-        program = subprocess.Popen([os.path.abspath(PROGRAM), '--no-lcm', '--csv', self.csv, '--summary',
+        program = subprocess.Popen([os.path.abspath(PROGRAM), *patience, '--no-lcm', '--csv', self.csv, '--summary',
                                     self.summary_file, *map(str, args)], **streams)
         self.addCleanup(self.end, program)
         deadline = time.monotonic() + 30
@@ -68,7 +68,7 @@ class Stopping(ProgramTest):
                 self.assertLess(time.monotonic() - before, 10)
 
     def test_a_stalled_program_is_a_fault(self):
-        program = self.start('--set', 'experiment.start_speed_rad_s=0')
+        program = self.start('--set', 'experiment.start_speed_rad_s=0', patience=())
         self.wait_for_speed(program, 60.0)
         program.send_signal(signal.SIGSTOP)
         time.sleep(0.6)

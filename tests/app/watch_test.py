@@ -19,6 +19,8 @@ import termios
 import threading
 import time
 
+from live import PATIENT
+
 PROGRAM, PRIVATE_NETWORK, MODULE_DIR = map(os.path.abspath, sys.argv[1:4])
 COLUMNS, ROWS = 90, 30
 
@@ -140,7 +142,7 @@ class Watcher:
 
 
 def run(*arguments):
-    return subprocess.Popen([PROGRAM, '--no-out', *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen([PROGRAM, *PATIENT, '--no-out', *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def garbage():

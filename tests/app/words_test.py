@@ -9,7 +9,7 @@ import stat
 import subprocess
 import unittest
 
-from program import PROGRAM, ProgramTest
+from program import PATIENT, PROGRAM, ProgramTest
 
 START = ('--set', 'experiment.start_speed_rad_s=170')
 STUDY = 'chunk = 1\n[factors]\nplant.theta_N = { from = 20, to = 25, steps = %d }\n'
@@ -81,7 +81,7 @@ class Folders(ProgramTest):
                 self.assertTrue((folder / 'SHA256SUMS').exists())
 
     def test_runs_that_begin_in_the_same_second_have_a_folder_each(self):
-        runs = [subprocess.Popen([pathlib.Path(PROGRAM).resolve(), '--no-lcm', '--rt', 'off', *START], cwd=self.folder,
+        runs = [subprocess.Popen([pathlib.Path(PROGRAM).resolve(), *PATIENT, '--no-lcm', '--rt', 'off', *START], cwd=self.folder,
                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                  env={**os.environ, 'ABS_HIL_RUNS_DIR': 'runs', 'TZ': 'No/Where'}) for _ in range(4)]
         for run in runs:

@@ -14,7 +14,7 @@ HISTOGRAM_HEAD = '# abs_hil, us; columns: wake-up latency, read, control, write,
 class SideFiles(ReportTest):
     def make_real_run(self, name):
         folder = self.folder / name
-        subprocess.run([ABS_HIL, '--backend', 'sim', '--no-lcm', '--rt', 'off', '--out', folder,
+        subprocess.run([ABS_HIL, '--backend', 'sim', '--no-lcm', '--rt', 'off', '--set', 'realtime.cycle_gap_max_s=10', '--out', folder,
                         '--set', 'experiment.start_speed_rad_s=60'], capture_output=True, timeout=60, check=True)
         return folder
 

@@ -127,9 +127,9 @@ def _doubt(found: Identified) -> str:
         return (f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of '
                 f'parameters only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
-        return (f'the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, '
-                'expected 1); is it of another rig, has something changed between the logs, or is the brake weaker in some of '
-                'them (--drift brake_torque)?')
+        return (f'the model lacks something, or not all logs are of one rig in one state: the logs disagree, {odd} most '
+                f'(chi-square per degree of freedom {found.disagreement[odd]:.3g}, expected 1). If the brake was weaker in some '
+                'of them, give --drift brake_torque')
     return ''
 
 
