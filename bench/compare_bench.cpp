@@ -2,8 +2,8 @@
 
 #include <benchmark/benchmark.h>
 
+#include "study/compute.hpp"
 #include "study/parallel.hpp"
-#include "study/runs.hpp"
 
 namespace {
 

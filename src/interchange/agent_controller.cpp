@@ -13,7 +13,7 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "driver/file_descriptor.hpp"
 #include "interchange/foreign_controller.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::interchange {
 

@@ -26,9 +26,8 @@
 #include "interchange/foreign_controller.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "run/run_summary.hpp"
 #include "runtime/record_pump.hpp"
 

@@ -20,13 +20,11 @@
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/script.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/clean_text.hpp"
-#include "run_folder/series_folder.hpp"
+#include "rig/formatted_text.hpp"
+#include "run_folder/run_folder.hpp"
 #include "study/parallel.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/lcm_url.hpp"
 #include "telemetry/message_stream.hpp"
 
 namespace abs_hil::program {

@@ -16,8 +16,6 @@
 #include "files/result_file.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
-#include "rig/clean_text.hpp"
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
