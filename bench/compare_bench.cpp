@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "run/parallel.hpp"
-#include "study/runs.hpp"
+#include "study/compute.hpp"
 
 namespace {
 

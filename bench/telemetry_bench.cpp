@@ -9,8 +9,8 @@
 
 #include "experiment/simulated_run.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/log_outlet.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace {

@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::commands {

@@ -8,9 +8,9 @@
 #include <chrono>
 #include <utility>
 
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 #include "runtime/realtime_setup.hpp"
-#include "telemetry/checked_decode.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -16,7 +16,6 @@
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/receiver.hpp"
-#include "telemetry/udpm_receiver.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -48,7 +47,7 @@ class CommandListener {
   };
 
   /// Outlet and stream must outlive the listener. `on_stop` is called once for every stop; it must not throw; after
-  /// listen() it runs in the listening thread. With udpm the listener receives without liblcm (udpm_receiver.hpp) and
+  /// listen() it runs in the listening thread. With udpm the listener receives without liblcm (UdpmReceiver) and
   /// also gets this process's own traffic. Throws LcmError if it cannot join udpm's multicast group.
   CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop);
 

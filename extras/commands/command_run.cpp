@@ -7,8 +7,8 @@
 #include "commands/command_listener.hpp"
 #include "commands/remote_commands.hpp"
 #include "program/extra.hpp"
-#include "rig/clean_text.hpp"
-#include "telemetry/lcm_url.hpp"
+#include "rig/formatted_text.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::commands {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::commands {
 

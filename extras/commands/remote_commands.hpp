@@ -8,7 +8,7 @@
 #include "commands/authority.hpp"
 #include "commands/command_listener.hpp"
 #include "config/live_settings.hpp"
-#include "experiment/adjustment.hpp"
+#include "experiment/run_logic.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
 #include "telemetry/message_stream.hpp"

@@ -7,7 +7,7 @@
 #include "config/config_error.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
-#include "telemetry/lcm_url.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::program {
 

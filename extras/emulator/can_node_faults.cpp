@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "emulator/can_node.hpp"
-#include "emulator/fault_text.hpp"
+#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 

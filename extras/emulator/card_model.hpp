@@ -15,7 +15,6 @@
 #include <string>
 #include <string_view>
 
-#include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {

@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {

@@ -13,7 +13,6 @@
 #include <string_view>
 #include <vector>
 
-#include "emulator/fault_text.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {

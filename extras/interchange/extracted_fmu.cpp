@@ -21,7 +21,7 @@
 #include "interchange/confinement.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::interchange {
 

@@ -17,7 +17,6 @@
 
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
-#include "interchange/loaded_library.hpp"
 #include "rig/file_uri.hpp"
 
 namespace abs_hil::interchange {

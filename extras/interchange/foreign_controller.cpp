@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "interchange/agent_controller.hpp"
 #include "interchange/hosted_code.hpp"
 #include "runtime/clock.hpp"
 
@@ -132,10 +131,7 @@ std::array<control::ControllerFiles, 4> foreign_controllers() noexcept {
   const auto make = [](const std::string& file, const control::ControllerContext& context) -> Made {
     return std::make_unique<ForeignController>(file, context, chosen_home.load());
   };
-  const auto make_of_agent = [](const std::string& file, const control::ControllerContext& context) -> Made {
-    return std::make_unique<AgentController>(file, context);
-  };
-  return {{{".so", make}, {".fmu", make}, {rig::FileEndings::python_class, make}, {".agent", make_of_agent}}};
+  return {{{".so", make}, {".fmu", make}, {rig::FileEndings::python_class, make}, {".agent", make_agent_controller}}};
 }
 
 void register_foreign_controllers() {

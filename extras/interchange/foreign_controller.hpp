@@ -89,6 +89,11 @@ void for_each_output(Foreign& foreign, Own& own, const Take& take) {
 [[nodiscard]] control::SlipInput slip_input(const abs_hil_input& foreign) noexcept;
 [[nodiscard]] abs_hil_output foreign_output(const control::SlipOutput& out) noexcept;
 
+/// The controller of a file FILE.agent. Throws std::invalid_argument, which names the file, if it is no page of an
+/// agent.
+[[nodiscard]] std::unique_ptr<control::SlipController> make_agent_controller(const std::string& file,
+                                                                             const control::ControllerContext& context);
+
 /// What makes controllers from files (docs/interchange.md), those of agents too. Code of files runs in a process of its
 /// own until `set_home` says otherwise.
 [[nodiscard]] std::array<control::ControllerFiles, 4> foreign_controllers() noexcept;

@@ -21,8 +21,8 @@ class ForeignRun final : public program::RunPart {
     set_home(on_rig_ ? Home::this_process : Home::own_process, s.unsafe.foreign_files);
   }
 
-  /// Takes note of the controller. Tries it out for a run in real time, and logs what real-time code must not do. Throws
-  /// std::invalid_argument if it cannot run at this rate.
+  /// Takes note of the controller. Tries it out for a run in real time, and logs what real-time code must not do.
+  /// Throws std::invalid_argument if it cannot run at this rate.
   void attach(run::Run& run) override {
     controller_ = dynamic_cast<ForeignController*>(&run.controller());
     if (controller_ == nullptr) return;
@@ -93,11 +93,10 @@ class ForeignRun final : public program::RunPart {
 namespace abs_hil::program {
 
 extern const Extra interchange_extra;
-constinit const Extra interchange_extra{
-    .name = "interchange",
-    .begin = &interchange::register_foreign_controllers,
-    .join = [](const RunRequest& request) -> std::unique_ptr<RunPart> {
-      return std::make_unique<interchange::ForeignRun>(request.settings);
-    }};
+constinit const Extra interchange_extra{.name = "interchange",
+                                        .begin = &interchange::register_foreign_controllers,
+                                        .join = [](const RunRequest& request) -> std::unique_ptr<RunPart> {
+                                          return std::make_unique<interchange::ForeignRun>(request.settings);
+                                        }};
 
 }  // namespace abs_hil::program

@@ -21,8 +21,7 @@
 #include "abs_hil/rig/option.hpp"
 #include "driver/spawn.hpp"
 #include "interchange/confinement.hpp"
-#include "rig/clean_text.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
 

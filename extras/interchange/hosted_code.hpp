@@ -6,8 +6,8 @@
 #include <string>
 
 #include "driver/file_descriptor.hpp"
+#include "interchange/confinement.hpp"
 #include "interchange/foreign_code.hpp"
-#include "interchange/host.hpp"
 
 namespace abs_hil::interchange {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "config/config_error.hpp"
-#include "study/lanes/lane_jobs.hpp"
 #include "run/parallel.hpp"
+#include "study/lanes/lane_jobs.hpp"
 
 namespace abs_hil::study {
 

@@ -22,14 +22,11 @@
 #include "config/key_table.hpp"
 #include "config/model.hpp"
 #include "driver/spawn.hpp"
-#include "program/command_line.hpp"
-#include "program/signals.hpp"
-#include "study/study_command.hpp"
 #include "program/subcommands.hpp"
+#include "run/parallel.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
-#include "run/parallel.hpp"
-#include "study/runs.hpp"
+#include "study/study_command.hpp"
 
 namespace abs_hil::program {
 

@@ -13,12 +13,10 @@
 
 #include "config/config_error.hpp"
 #include "program/extra.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
-#include "study/runs.hpp"
 
 namespace abs_hil::program {
 

@@ -1,20 +1,39 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "abs_hil/rig/phase.hpp"
+#include "abs_hil/rig/signals.hpp"
 #include "config/script.hpp"
 #include "config/settings.hpp"
+#include "rig/record_sink.hpp"
 #include "study/design.hpp"
-#include "study/signal_metrics.hpp"
 #include "study/variation.hpp"
 
 // A study's file, table by table (docs/studies.md). Each key is one row: see config/grammar.hpp.
+
+namespace abs_hil::study {
+
+/// What a study's own metric makes of the values.
+enum class Reduction : std::uint8_t { max, min, mean, rms, last };
+
+}  // namespace abs_hil::study
+
+template <>
+inline constexpr std::array<abs_hil::config::Word<abs_hil::study::Reduction>, 5>
+    abs_hil::config::words_of<abs_hil::study::Reduction>{{{"max", study::Reduction::max},
+                                                          {"min", study::Reduction::min},
+                                                          {"mean", study::Reduction::mean},
+                                                          {"rms", study::Reduction::rms},
+                                                          {"last", study::Reduction::last}}};
 
 template <>
 inline constexpr std::array<abs_hil::config::Word<abs_hil::study::DesignKind>, 5>
@@ -58,6 +77,26 @@ struct RepeatScript {
   ABS_HIL_OPTION(std::uint64_t, seed, 1, .meaning = "seed of the varied plants; without: 1",
                  .range = rig::from_zero(9e15));
   Variation variation{};  ///< of `vary`; without [repeat] nothing varies
+
+  void check(const config::TableReader& reader);
+};
+
+/// A metric that a study defines, in a table of its file: one number made of a signal's values in a phase.
+struct SignalMetric {
+  ABS_HIL_OPTIONS(SignalMetric);
+  static constexpr std::string_view title = "[[metric]]";
+  static constexpr std::string_view meaning = "One number made of a signal's values in a phase";
+  static constexpr std::array<std::string_view, 3> required{"name", "of", "take"};
+  ABS_HIL_OPTION(std::string, name, {}, .meaning = "of its column in the results");
+  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal");
+  ABS_HIL_OPTION(Reduction, take, Reduction::max, .meaning = "what is made of the values");
+  ABS_HIL_OPTION(rig::Phase, phase, rig::Phase::brake, .meaning = "in which kind of phase; without: brake",
+                 .allowed = {"accelerate", "coast", "brake", "hold", "stopped"});
+  ABS_HIL_OPTION(double, after_s, 0.0, .key = "after", .unit = "s", .meaning = "from this time after its begin on",
+                 .range = rig::from_zero(600));
+  ABS_HIL_OPTION(double, above_m_s, 0.0, .key = "above", .unit = "m/s",
+                 .meaning = "only while the car is faster than this", .range = rig::from_zero(200));
+  config::Place place{};  ///< in the study's file
 
   void check(const config::TableReader& reader);
 };
@@ -116,5 +155,30 @@ struct Contender {
 /// part may be left out. A file sets the same keys, and without a controller before it names that in
 /// control.controller. Throws config::ConfigError and std::invalid_argument, naming entry, key and fix.
 [[nodiscard]] Contender read_contender(const std::string& text, const config::Settings& common);
+
+/// Computes such metrics from the records of a run.
+class SignalMetrics final : public rig::RecordSink {
+ public:
+  /// @param signals  of the run's controller @param r2_m  the lower wheel's radius
+  SignalMetrics(const std::vector<SignalMetric>& metrics, std::span<const rig::Signal> signals, double r2_m);
+
+  void consume(const rig::CycleRecord& record, double distance_m) override;
+  /// In the order of the metrics. NaN if no record counted or the controller has no such signal. Values that are NaN do
+  /// not count.
+  [[nodiscard]] std::vector<double> values() const;
+
+ private:
+  struct Running {
+    SignalMetric metric{};
+    std::size_t column{0};  ///< of the CSV, then of the controller's signals
+    std::uint64_t count{0};
+    double value{0.0};
+    double begin_s{0.0};  ///< of the phase
+    bool within{false};   ///< the last record was of the phase
+  };
+
+  double r2_m_;
+  std::vector<Running> running_{};
+};
 
 }  // namespace abs_hil::study

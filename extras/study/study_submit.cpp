@@ -14,13 +14,11 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
-#include "study/study_command.hpp"
 #include "program/subcommands.hpp"
-#include "rig/clean_text.hpp"
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
+#include "study/study_command.hpp"
 
 namespace abs_hil::program {
 

@@ -43,7 +43,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *,
 
 
 def refusal(error: OSError, place: object = None, deed: str = 'write') -> str:
-    """The system's words with a fix for a person (src/rig/error_words.cpp). deed: 'write', 'read' or 'reach'."""
+    """The system's words with a fix for a person (src/rig/formatted_text.cpp). deed: 'write', 'read' or 'reach'."""
     if not error.errno or error.errno < 0:  # as of a name that no server knows
         return error.strerror or str(error)
     return _core.refusal(error.errno, str(error.filename or '' if place is None else place), deed)

@@ -24,7 +24,6 @@
 #include "rig/record_sink.hpp"
 #include "run/run_summary.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/events.hpp"
 
 namespace abs_hil::lab {
 

@@ -16,8 +16,8 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "array.hpp"
 #include "bindings.hpp"
-#include "run/run.hpp"
 #include "run/parallel.hpp"
+#include "run/run.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {

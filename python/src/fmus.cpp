@@ -9,8 +9,7 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "bindings.hpp"
-#include "interchange/fmu/controller_model.hpp"
-#include "interchange/fmu/plant_model.hpp"
+#include "interchange/fmu/models.hpp"
 
 namespace abs_hil::python {
 

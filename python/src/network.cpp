@@ -19,12 +19,11 @@
 
 #include "commands/authority.hpp"
 #include "commands/sender.hpp"
+#include "interchange/confinement.hpp"
 #include "interchange/foreign_controller.hpp"
-#include "interchange/host.hpp"
 #include "interchange/hosted_code.hpp"
 #include "python_law.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/lcm_url.hpp"
 #include "telemetry/receiver.hpp"
 
 namespace {

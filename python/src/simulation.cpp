@@ -18,9 +18,9 @@
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
 #include "interruptible.hpp"
+#include "run/parallel.hpp"
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
-#include "run/parallel.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {

@@ -9,8 +9,6 @@
 #include "bindings.hpp"
 #include "interruptible.hpp"
 #include "study/compute.hpp"
-#include "study/gzip.hpp"
-#include "study/runs.hpp"
 #include "study/study_folder.hpp"
 
 namespace abs_hil::python {

@@ -15,7 +15,6 @@
 #include <sstream>
 #include <type_traits>
 
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::config {
 

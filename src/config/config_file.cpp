@@ -12,7 +12,7 @@
 
 #include "config/config_error.hpp"
 #include "config/reader.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "config/settings.hpp"
-#include "experiment/adjustment.hpp"
+#include "experiment/run_logic.hpp"
 
 namespace abs_hil::config {
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "config/board_policy.hpp"
 #include "config/config_file.hpp"
-#include "config/safety_view.hpp"
 #include "config/script.hpp"
 #include "config/settings.hpp"
 

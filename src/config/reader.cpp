@@ -7,7 +7,7 @@
 
 #include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 #include "rig/parse_toml.hpp"
 

@@ -7,9 +7,7 @@
 #include "control/adaptive_actuator_controller.hpp"
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_gains.hpp"
-#include "control/adaptive_peak_controller.hpp"
-#include "control/adaptive_predictor_controller.hpp"
-#include "control/braking_stiffness_controller.hpp"
+#include "control/seeking_controllers.hpp"
 
 namespace abs_hil::control {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "driver/pwm.hpp"
+#include "driver/board_options.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver {

@@ -1,6 +1,6 @@
 // What ResultFile and FileError do alike on every platform: texts of errors, and writing in large pieces.
 #include "files/result_file.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::files {
 

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::files {
 

@@ -24,7 +24,6 @@
 #include "driver/monotonic_time.hpp"
 #include "guardian/guard.hpp"
 #include "guardian/linux_process.hpp"
-#include "rig/clean_text.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {

@@ -20,7 +20,6 @@
 #include "driver/spawn.hpp"
 #include "guardian/lease_wire.hpp"
 #include "guardian/linux_process.hpp"
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
 #include "telemetry/flight_record.hpp"

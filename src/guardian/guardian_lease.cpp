@@ -20,7 +20,7 @@
 #include "config/board_policy.hpp"
 #include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 

@@ -17,7 +17,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/sysfs.hpp"
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 

@@ -33,8 +33,7 @@
 #include "guardian/machine.hpp"
 #include "guardian/standby.hpp"
 #include "guardian/talker.hpp"
-#include "rig/clean_text.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 

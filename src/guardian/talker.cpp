@@ -12,7 +12,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "guardian/linux_process.hpp"
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 

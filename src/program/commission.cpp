@@ -20,7 +20,6 @@
 #include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"
 #include "program/run_monitor.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "version/build_facts.hpp"
 

@@ -16,16 +16,15 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "diagnosis/doctor.hpp"
-#include "diagnosis/latency_verdict.hpp"
+#include "diagnosis/machine_facts.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "experiment/sequence.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "program/run_monitor.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"
-#include "telemetry/lcm_url.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::program {
 

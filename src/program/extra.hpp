@@ -1,5 +1,6 @@
-// What an extra brings to the program and to a run. Extras are the rooms of extras/ (cmake/Rooms.cmake), which a laboratory
-// may leave out. No file of src includes one: the build makes the list of those that it has (cmake/Extras.cmake).
+// What an extra brings to the program and to a run. Extras are the rooms of extras/ (cmake/Rooms.cmake), which a
+// laboratory may leave out. No file of src includes one: the build makes the list of those that it has
+// (cmake/Extras.cmake).
 #pragma once
 
 #include <chrono>
@@ -8,7 +9,6 @@
 #include <span>
 #include <string_view>
 
-#include "program/command_line.hpp"
 #include "program/subcommands.hpp"
 #include "rig/record_sink.hpp"
 #include "run/run.hpp"
@@ -17,8 +17,8 @@
 
 namespace abs_hil::program {
 
-/// An extra's part in one run, in the order of the calls. It is made before the run and lives until the run's summary is
-/// written. All calls come from the slow thread.
+/// An extra's part in one run, in the order of the calls. It is made before the run and lives until the run's summary
+/// is written. All calls come from the slow thread.
 class RunPart {
  public:
   virtual ~RunPart() = default;

@@ -27,9 +27,8 @@
 #include "program/extra.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
-#include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "run/run_summary.hpp"
 #include "runtime/record_pump.hpp"
 
@@ -222,7 +221,8 @@ std::vector<std::unique_ptr<RunPart>> run_parts(const RunRequest& request) {
   if (request.settings.commands.enabled &&
       std::ranges::find(extras(), std::string_view("commands"), &Extra::name) == extras().end()) {
     throw config::ConfigError(
-        "commands.enabled = true, but this abs_hil was built without the extra \"commands\"; leave the key out, or build "
+        "commands.enabled = true, but this abs_hil was built without the extra \"commands\"; leave the key out, or "
+        "build "
         "with -DABS_HIL_COMMANDS=ON");
   }
   std::vector<std::unique_ptr<RunPart>> parts;

@@ -11,7 +11,7 @@
 
 #include "config/config_error.hpp"
 #include "experiment/board_record.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/flight_record.hpp"
 #include "version/build_facts.hpp"
 

@@ -7,7 +7,7 @@
 #include "guardian/guard.hpp"
 #include "guardian/guardian_lease.hpp"
 #include "guardian/shared_region.hpp"
-#include "program/command_line.hpp"
+#include "program/subcommands.hpp"
 #include "run/run.hpp"
 #include "telemetry/message_stream.hpp"
 

@@ -11,7 +11,7 @@
 #include "config/config_error.hpp"
 #include "config/merge.hpp"
 #include "program/run_monitor.hpp"
-#include "telemetry/lcm_url.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::program {
 

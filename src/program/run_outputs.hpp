@@ -8,14 +8,12 @@
 
 #include "analysis/run_summary.hpp"
 #include "files/result_file.hpp"
-#include "program/command_line.hpp"
 #include "program/extra.hpp"
 #include "run/run.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/events.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/log_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/status_line.hpp"
 
@@ -26,8 +24,8 @@ namespace abs_hil::program {
 class RunOutputs {
  public:
   /// The outputs of the run, which must outlive them: the run hands them its records, ABS_STATUS and the status line
-  /// show its state, and the extras' parts act on it from here on. Throws config::ConfigError for files and folders that
-  /// cannot be written, and telemetry::LcmError without a network.
+  /// show its state, and the extras' parts act on it from here on. Throws config::ConfigError for files and folders
+  /// that cannot be written, and telemetry::LcmError without a network.
   RunOutputs(const RunRequest& request, run::Run& run, std::vector<std::unique_ptr<RunPart>> parts);
 
   /// Lets the extras' parts work.

@@ -20,10 +20,8 @@
 #include "config/config_error.hpp"
 #include "config/script.hpp"
 #include "program/extra.hpp"
-#include "program/signals.hpp"
-#include "program/subcommands.hpp"
 #include "run/parallel.hpp"
-#include "run_folder/series_folder.hpp"
+#include "run_folder/run_folder.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::program {

@@ -1,6 +1,4 @@
 // Notes SIGINT, SIGTERM and SIGHUP. A run asks for them between its cycles, or is told by the handler.
-#include "program/signals.hpp"
-
 #include <fcntl.h>
 #include <unistd.h>
 

@@ -1,17 +1,72 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/rig/reason.hpp"
 #include "cli/command_line.hpp"
-#include "program/command_line.hpp"
+#include "config/merge.hpp"
+#include "files/result_file.hpp"
 #include "run/run.hpp"
 
 namespace abs_hil::program {
+
+/// The files of a run's records, and its network.
+struct OutputOptions {
+  std::optional<std::string> csv_file{};
+  std::optional<std::string> log_file{};
+  std::optional<std::string> summary_file{};
+  std::optional<std::string> histogram_file{};
+  std::optional<std::string> recorder_dir{};  ///< --recorder: folder of the flight record, written after a fault
+  std::optional<std::string> prior_file{};    ///< --prior, renewed after a stop
+  std::optional<std::string> lcm_url{};
+  bool no_lcm{false};
+  std::optional<std::string> run_folder{};  ///< --out: a new or empty folder
+  bool no_run_folder{false};                ///< --no-out
+
+  /// True if an option names a file for the run's records.
+  [[nodiscard]] bool names_files() const { return csv_file || log_file || summary_file || histogram_file; }
+};
+
+/// The options of `abs_hil` as typed, before they are merged with files.
+struct RunOptions : config::Sources {
+  OutputOptions outputs{};
+};
+
+/// A completely specified run: its effective configuration and the files of its records.
+struct RunRequest : config::Configuration {
+  OutputOptions outputs{};
+  bool virtual_time{false};                 ///< --fast
+  std::vector<std::string> command_line{};  ///< as typed; recorded in environment.json
+  /// Set for one run of a series: the run prints only faults, and calls this now and then with its current phase.
+  std::function<void(std::string_view phase)> in_series{};
+  /// Called after a run of a series if somebody sent it a stop, even one that came too late for that run.
+  std::function<void()> stop_was_sent{};
+};
+
+/// True if the run takes commands over LCM.
+[[nodiscard]] bool hears_commands(const RunRequest& request);
+/// True if stdin is a terminal.
+[[nodiscard]] bool at_terminal() noexcept;
+/// Refuses a run whose questions nobody could answer, or that would move a rig without a person's answer. Throws
+/// config::ConfigError.
+void check_questions(const RunRequest& request);
+
+/// Opens a result before anything moves, so that a bad path is reported at once; null without a path. Throws
+/// config::ConfigError. @param kind  for messages, as "histogram"
+[[nodiscard]] std::unique_ptr<files::ResultFile> open_result(const std::optional<std::string>& path,
+                                                             const std::string& kind);
+
+/// No result of this process may replace a file that these name.
+void keep_inputs(const config::Sources& sources);
+
+/// The options as a run. A person answers its questions on a rig or at a terminal. Throws config::ConfigError.
+[[nodiscard]] RunRequest merge(const RunOptions& options);
 
 /// Exit statuses of the program (docs/experiments.md).
 enum ExitStatus : int {
@@ -29,8 +84,8 @@ using Words = std::vector<std::string>;
 /// What a subcommand does after the command line is read. Returns the exit status. Throws what program.cpp catches.
 using Action = std::function<int()>;
 
-/// One row of the table of subcommands (subcommands.cpp, and those of the extras). `abs_hil --help`, the shell's completion and the search for
-/// the nearest name are made from it.
+/// One row of the table of subcommands (subcommands.cpp, and those of the extras). `abs_hil --help`, the shell's
+/// completion and the search for the nearest name are made from it.
 struct Subcommand {
   std::string_view name;
   std::string_view help;
@@ -91,5 +146,36 @@ void add_threads(cli::Parser& parser, std::size_t& threads);
 void add_timing_options(cli::Parser& parser, config::Sources& o, std::optional<std::string>& histogram_file);
 /// All of a run's.
 void add_run_options(cli::Parser& parser, RunOptions& o);
+
+// Signals to the program, and its terminals.
+
+/// Opens /dev/null on each of the descriptors 0, 1 and 2 that was closed at program start, so that no file of the run
+/// gets that number and receives messages for people. Also ignores SIGPIPE.
+void survive_closed_terminals();
+
+/// From now on SIGINT, SIGTERM and SIGHUP are noted and do not end the program. Under nohup SIGHUP stays ignored.
+/// @param may_leave  a second signal ends the program at once: there are no outputs
+void note_signals(bool may_leave = false);
+[[nodiscard]] constexpr bool is_signal(rig::Reason reason) noexcept {
+  return reason == rig::Reason::interrupt_signal || reason == rig::Reason::terminate_signal ||
+         reason == rig::Reason::hangup_signal;
+}
+/// Exit status of a program that a signal ended.
+[[nodiscard]] int status_of(rig::Reason signal) noexcept;
+/// The stop reason of a noted signal; `none` if there was none.
+[[nodiscard]] rig::Reason signalled() noexcept;
+
+/// While this object lives, a signal ends the run at its next cycle, directly from the handler: a slow thread
+/// that hangs at a disk or network causes no delay. A second signal ends the program at once, if that is safe.
+class SignalsStop {
+ public:
+  /// @param may_leave  true if a guardian protects the outputs, or if there are no real outputs
+  SignalsStop(run::Run& run, bool may_leave) noexcept;
+  SignalsStop(const SignalsStop&) = delete;
+  SignalsStop& operator=(const SignalsStop&) = delete;
+  ~SignalsStop();
+  /// Call when the outputs are safe: a second signal may then end the program.
+  void allow_leaving() noexcept;
+};
 
 }  // namespace abs_hil::program

@@ -79,4 +79,23 @@ template <typename Number>
   return error == std::errc() && at == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
+/// Makes somebody else's text fit to show: valid UTF-8 without control characters, at most `most_characters`, with an
+/// ellipsis in place of the rest. Invalid bytes and control characters, but those in `kept`, become U+FFFD. Not
+/// real-time safe.
+[[nodiscard]] std::string clean_text(std::string_view text, std::size_t most_characters = 200,
+                                     std::string_view kept = {});
+
+/// True if `text` is valid UTF-8 (RFC 3629).
+[[nodiscard]] bool is_utf8(std::string_view text);
+
+/// What the program wanted of a place when the system refused it.
+enum Deed : unsigned { writing = 1, reading = 2, starting = 4, reaching = 8 };
+
+/// The system's words for an errno with what a person can do: "Permission denied; get the right ...".
+/// @param place  the file, folder or program; of `reaching` the address, socket or device
+[[nodiscard]] std::string refusal(int error, const std::string& place, Deed deed);
+
+/// What a library or another program said, with cause and fix where the table knows its words, else with `otherwise`.
+[[nodiscard]] std::string refusal(std::string_view words, const std::string& place, std::string_view otherwise = {});
+
 }  // namespace abs_hil::rig

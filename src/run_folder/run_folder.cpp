@@ -1,27 +1,31 @@
-// Creates a run's folder, seals it with checksums, and tells on what the run depended.
+// Folders of runs and of series of runs: their names, their checksums, and on what a run depended.
 #include "run_folder/run_folder.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
-#ifndef _WIN32
-#include <sys/utsname.h>
-#endif
 
 #include "files/result_file.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
+#include "rig/parse_json.hpp"
 #include "run_folder/sha256.hpp"
 #include "version/build_facts.hpp"
+#ifndef _WIN32
+#include <sys/utsname.h>
+#include <unistd.h>
+#endif
 
 namespace abs_hil::run_folder {
 
@@ -57,6 +61,55 @@ System system_facts() {
   if (::uname(&system) != 0) return {};
   return {system.nodename, fmt::format("{} {} {}", system.sysname, system.release, system.version), system.machine};
 #endif
+}
+
+void move_to(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) {
+    throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(),
+                                  rig::refusal(error.value(), to.string(), rig::writing)));
+  }
+}
+
+/// Text under `key`, if there is one: somebody may have damaged the file.
+std::optional<std::string> text_of(const nlohmann::ordered_json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_string()) return std::nullopt;
+  return object[key].get<std::string>();
+}
+
+/// Letters from `first` on in ASCII: Latin ones without their marks, Greek by ELOT 743, Cyrillic as passports have it.
+struct Script {
+  char32_t first;
+  std::string_view letters;
+};
+constexpr Script scripts[] = {
+    {0xB5, "m"},
+    {0xC0,
+     "A A A A A A AE C E E E E I I I I D N O O O O O - O U U U U Y Th ss a a a a a a ae c e e e e i i i i d n o o o o "
+     "o - o u u u u y th y A a A a A a C c C c C c C c D d D d E e E e E e E e E e G g G g G g G g H h H h I i I i I i "
+     "I i I i IJ ij J j K k k L l L l L l L l L l N n N n N n n N n O o O o O o OE oe R r R r R r S s S s S s S s T t "
+     "T t T t U u U u U u U u U u U u W w Y y Y Z z Z z Z z s"},
+    {0x386,
+     "A - E I I - O - Y O i A V G D E Z I Th I K L M N X O P R - S T Y F Ch Ps O I Y a e i i y a v g d e z i th i k l "
+     "m n x o p r s s t y f ch ps o i y o y o"},
+    {0x400,
+     "E Yo Dj G Ye Dz I Yi J Lj Nj C K I U Dz A B V G D E Zh Z I Y K L M N O P R S T U F Kh Ts Ch Sh Shch  Y  E Yu "
+     "Ya a b v g d e zh z i y k l m n o p r s t u f kh ts ch sh shch  y  e yu ya e yo dj g ye dz i yi j lj nj c k i "
+     "u dz"}};
+
+/// A character, of that code and those bytes, as a part of a name; "-" for what is no letter.
+std::string in_ascii(char32_t code, std::string_view bytes) {
+  constexpr std::string_view kept = "_=.";
+  if (code < 0x80)
+    return std::isalnum(static_cast<int>(code)) != 0 || kept.find(bytes) != kept.npos ? std::string(bytes) : "-";
+  for (const Script& script : scripts) {
+    const auto letters = rig::split(script.letters, ' ');
+    if (code >= script.first && code - script.first < letters.size()) return std::string(letters[code - script.first]);
+  }
+  if (code >= 0x300 && code < 0x370) return {};  // a mark of the letter before
+  // Letters of other scripts stay; between them are signs, and behind them what has no form of its own.
+  return (code >= 0x531 && code < 0x2000) || (code >= 0x3041 && code < 0xD800) ? std::string(bytes) : "-";
 }
 
 }  // namespace
@@ -170,6 +223,122 @@ nlohmann::ordered_json environment_json(const RunEnvironment& run) {
       {"board", {{"name", run.board}, {"emulated", run.emulated}, {"notes", run.board_notes}}},
       {"real_time",
        {{"virtual_time", run.virtual_time}, {"obtained", run.realtime}, {"shortcomings", run.realtime_shortcomings}}}};
+}
+
+SeriesFolder::SeriesFolder(fs::path path, std::string identity, std::string title, std::vector<SeriesEntry> runs)
+    : path_(std::move(path)), identity_(std::move(identity)), title_(std::move(title)), runs_(std::move(runs)) {
+  std::error_code error;
+  if (fs::exists(path_ / series_index, error)) {
+    read_index(identity_);
+    resumed_ = true;
+  } else {
+    RunFolder checked_and_made(path_);
+    write_index();
+  }
+}
+
+std::string SeriesFolder::name_of(std::size_t run) { return fmt::format("run-{:04}", run + 1); }
+
+void SeriesFolder::read_index(const std::string& identity) {
+  const fs::path index = path_ / series_index;
+  std::ifstream in(index);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const auto json = rig::parse_json_if_valid<nlohmann::ordered_json>(text);
+  const auto has_status = [](const nlohmann::ordered_json& run) { return text_of(run, "status").has_value(); };
+  const bool whole = text_of(json, "identity") == identity && json.contains("runs") && json["runs"].is_array() &&
+                     json["runs"].size() == runs_.size() && std::ranges::all_of(json["runs"], has_status);
+  if (!whole) {
+    throw FolderError(
+        fmt::format("--out: \"{}\" holds another series of runs (script, configuration or seeds differ, or its {} is "
+                    "damaged); give "
+                    "a new or empty folder",
+                    path_.string(), series_index));
+  }
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    // The run folders decide: a killed program may leave the index one run ahead.
+    if (!fs::exists(path_ / name_of(i) / file::checksums)) continue;
+    check_seal(path_ / name_of(i));
+    runs_[i].status = text_of(json["runs"][i], "status").value_or("");
+  }
+}
+
+void SeriesFolder::write_index() const {
+  nlohmann::ordered_json runs = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    runs.push_back(
+        {{"folder", name_of(i)}, {"varied", runs_[i].varied}, {"seed", runs_[i].seed}, {"status", runs_[i].status}});
+  }
+  const nlohmann::ordered_json json{{"experiment", title_}, {"identity", identity_}, {"runs", std::move(runs)}};
+  files::write_result(path_ / series_index, "index of the series", json.dump(2) + '\n');
+}
+
+bool SeriesFolder::done(std::size_t run) const { return status(run) != "planned"; }
+
+std::string SeriesFolder::status(std::size_t run) const {
+  const std::scoped_lock lock(mutex_);
+  return runs_.at(run).status;
+}
+
+fs::path SeriesFolder::begin(std::size_t run) {
+  fs::path part = path_ / (name_of(run) + ".part");
+  for (const fs::path& old : {part, path_ / name_of(run)}) {
+    if (!fs::exists(old)) continue;
+    fs::path kept;
+    for (int i = 1; kept.empty() || fs::exists(kept); ++i) {
+      kept = path_ / fmt::format("{}.interrupted-{}", name_of(run), i);
+    }
+    move_to(old, kept);
+  }
+  return part;
+}
+
+bool SeriesFolder::end(std::size_t run, const std::string& status) {
+  const fs::path part = path_ / (name_of(run) + ".part");
+  if (!fs::exists(part / file::checksums)) return false;
+  const std::scoped_lock lock(mutex_);
+  runs_.at(run).status = status;
+  // First: the folder alone does not tell the status of its run.
+  write_index();
+  move_to(part, path_ / name_of(run));
+  return true;
+}
+
+std::string folder_name(std::string_view text, const fs::path& parent, std::size_t spare_bytes) {
+  std::string name;
+  for (std::size_t size = 0; !text.empty(); text.remove_prefix(size)) {
+    const auto first = static_cast<unsigned char>(text.front());
+    size = std::min<std::size_t>(first < 0xC0 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4, text.size());
+    char32_t code = size == 1 ? first : first & (0x7FU >> size);
+    for (const char c : text.substr(1, size - 1)) code = code << 6U | (static_cast<unsigned char>(c) & 0x3FU);
+    const std::string piece = in_ascii(code, text.substr(0, size));
+    if (piece != "-") {
+      name += piece;
+    } else if (!name.empty() && name.back() != '-') {
+      name += '-';
+    }
+  }
+  std::size_t most = 255;
+#ifndef _WIN32
+  if (const long allowed = ::pathconf(parent.empty() ? "." : parent.c_str(), _PC_NAME_MAX); allowed > 0)
+    most = static_cast<std::size_t>(allowed);
+#endif
+  for (most -= spare_bytes; most < name.size() && (name[most] & 0xC0) == 0x80;) --most;  // not within a character
+  name.resize(std::min(most, name.size()));
+  name.erase(name.find_last_not_of("-.") + 1);
+  return name.empty() ? "unnamed" : name;
+}
+
+fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::string_view experiment) {
+  constexpr std::size_t around = 32;  // date and time, and a number at the end
+  const fs::path path(experiment);
+  const std::string name = path.extension() == ".toml" ? path.stem().string() : path.string();
+  const std::string base = fmt::format("{:%Y%m%d-%H%M%S}-{}", local_time, folder_name(name, parent, around));
+  std::error_code error;
+  fs::create_directories(parent, error);
+  fs::path folder = parent / base;
+  // Another program may make the same one in this second: who makes it has it.
+  for (int i = 2; !fs::create_directory(folder, error) && !error; ++i) folder = parent / fmt::format("{}-{}", base, i);
+  return folder;
 }
 
 }  // namespace abs_hil::run_folder

@@ -16,7 +16,7 @@
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "rig/formatted_text.hpp"
-#include "telemetry/checked_decode.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

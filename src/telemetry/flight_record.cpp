@@ -8,7 +8,7 @@
 #include "files/result_file.hpp"
 #include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/log_outlet.hpp"
+#include "telemetry/event_log.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "abs_hil/adjustment_t.hpp"
 #include "files/result_file.hpp"
-#include "rig/clean_text.hpp"
+#include "rig/formatted_text.hpp"
 #include "rig/reason_text.hpp"
 
 namespace abs_hil::telemetry {

@@ -14,7 +14,7 @@
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
 #include "rig/timing_summary.hpp"
-#include "telemetry/events.hpp"
+#include "telemetry/csv_sink.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/outlet.hpp"
 

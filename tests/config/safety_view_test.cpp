@@ -1,13 +1,12 @@
 // One rule judges all that a run may do on a board, by whatever route a number comes: option, file, study, the settings
 // of an experiment, a run of its series, a phase.
-#include "config/safety_view.hpp"
-
 #include <cmath>
 #include <fstream>
 #include <functional>
 #include <stdexcept>
 
 #include "catch.hpp"
+#include "config/board_policy.hpp"
 #include "config/merge.hpp"
 #include "temporary_folder.hpp"
 

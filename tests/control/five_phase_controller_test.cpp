@@ -1,11 +1,10 @@
 // The five phases of the classic ABS, on a wheel whose acceleration is prescribed.
-#include "control/five_phase_controller.hpp"
-
 #include <stdexcept>
 #include <vector>
 
 #include "catch.hpp"
 #include "control/baseline_bench.hpp"
+#include "control/classic_controllers.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

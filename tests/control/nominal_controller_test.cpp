@@ -1,10 +1,9 @@
 // The law for a known tyre: e_v decays as the sum of two exponentials.
-#include "control/nominal_controller.hpp"
-
 #include <cmath>
 
 #include "catch.hpp"
 #include "control/braking_bench.hpp"
+#include "control/classic_controllers.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

@@ -5,9 +5,9 @@
 #include <random>
 
 #include "catch.hpp"
-#include "control/braking_stiffness_controller.hpp"
 #include "control/classic_controllers.hpp"
 #include "control/peak_bench.hpp"
+#include "control/seeking_controllers.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

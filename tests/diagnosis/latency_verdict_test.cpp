@@ -1,9 +1,8 @@
 // How `abs_hil latency` grades jitter, missed ticks and full periods.
-#include "diagnosis/latency_verdict.hpp"
-
 #include <nlohmann/json.hpp>
 
 #include "catch.hpp"
+#include "diagnosis/machine_facts.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::diagnosis;

@@ -12,9 +12,9 @@
 #include "config/key_table.hpp"
 #include "config/plan.hpp"
 #include "injected_run.hpp"
+#include "run/parallel.hpp"
 #include "simulated_run.hpp"
 #include "study/batch.hpp"
-#include "run/parallel.hpp"
 #include "study/variation.hpp"
 
 using namespace abs_hil;

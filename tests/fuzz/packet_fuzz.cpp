@@ -6,10 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "rig/clean_text.hpp"
-#include "telemetry/checked_decode.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/message_codec.hpp"
-#include "telemetry/udpm_receiver.hpp"
+#include "telemetry/receiver.hpp"
 
 using namespace abs_hil;
 

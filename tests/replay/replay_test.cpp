@@ -16,7 +16,7 @@
 #include "driver/injection/injecting_driver.hpp"
 #include "driver/injection/injection.hpp"
 #include "experiment/simulated_run.hpp"
-#include "telemetry/log_outlet.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"

@@ -1,7 +1,6 @@
 // Text from elsewhere is cleaned before it goes into a file.
-#include "rig/clean_text.hpp"
-
 #include "catch.hpp"
+#include "rig/formatted_text.hpp"
 
 using namespace abs_hil::rig;
 

@@ -1,6 +1,4 @@
 // What the system and the loader say, with cause and fix.
-#include "rig/error_words.hpp"
-
 #include <dlfcn.h>
 
 #include <cerrno>
@@ -8,6 +6,7 @@
 #include <fstream>
 
 #include "catch.hpp"
+#include "rig/formatted_text.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil::rig;

@@ -1,9 +1,8 @@
 // Folders of series: going on after an interruption, and what is refused.
-#include "run_folder/series_folder.hpp"
-
 #include <fstream>
 
 #include "catch.hpp"
+#include "run_folder/run_folder.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil::run_folder;

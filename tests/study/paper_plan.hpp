@@ -1,6 +1,6 @@
 #pragma once
 
-#include "study/runs.hpp"
+#include "study/compute.hpp"
 #include "study/study.hpp"
 
 namespace abs_hil::study::test {

@@ -8,7 +8,6 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "study/compute.hpp"
-#include "study/gzip.hpp"
 #include "study/paper_plan.hpp"
 #include "temporary_folder.hpp"
 

@@ -7,8 +7,8 @@
 
 #include "catch.hpp"
 #include "config/config_error.hpp"
+#include "study/compute.hpp"
 #include "study/paper_plan.hpp"
-#include "study/runs.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::study;

@@ -1,5 +1,4 @@
 // Decoding LCM messages that are whole, cut or wrong.
-#include "telemetry/checked_decode.hpp"
 
 #include <random>
 

@@ -5,8 +5,8 @@
 
 #include "catch.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/log_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"

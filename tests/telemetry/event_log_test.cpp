@@ -9,7 +9,6 @@
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "catch.hpp"
-#include "telemetry/log_outlet.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"

@@ -1,7 +1,6 @@
 // Events of a run, from its records.
-#include "telemetry/events.hpp"
-
 #include "catch.hpp"
+#include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,10 +1,9 @@
 // The parts of an LCM URL, and whether there is a route.
-#include "telemetry/lcm_url.hpp"
-
 #include <cstdlib>
 #include <stdexcept>
 
 #include "catch.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,12 +1,11 @@
 // Event logs: read back, times, replacing an older one.
-#include "telemetry/log_outlet.hpp"
-
 #include <fstream>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <map>
 
 #include "catch.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"

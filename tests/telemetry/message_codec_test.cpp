@@ -8,7 +8,6 @@
 
 #include "abs_hil/command_t.hpp"
 #include "catch.hpp"
-#include "telemetry/checked_decode.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
 

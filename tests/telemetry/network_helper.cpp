@@ -12,9 +12,9 @@
 #include <thread>
 
 #include "commands/command_listener.hpp"
-#include "telemetry/checked_decode.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/log_outlet.hpp"
+#include "telemetry/message_codec.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/receiver.hpp"
 #include "telemetry/sample_records.hpp"

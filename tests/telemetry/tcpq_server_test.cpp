@@ -12,7 +12,6 @@
 
 #include "catch.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

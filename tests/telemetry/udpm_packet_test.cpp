@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "telemetry/udpm_receiver.hpp"
+#include "telemetry/receiver.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

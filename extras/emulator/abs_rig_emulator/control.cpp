@@ -11,7 +11,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {

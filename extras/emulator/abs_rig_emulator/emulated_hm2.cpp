@@ -12,7 +12,6 @@
 
 #include "control.hpp"
 #include "emulator/udp_board.hpp"
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::program {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "interchange/host.hpp"
+#include "interchange/confinement.hpp"
 #include "version/build_facts.hpp"
 
 namespace {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "interchange/fmu/values.hpp"
+#include "interchange/fmu/component.hpp"
 
 namespace {
 

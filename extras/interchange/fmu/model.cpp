@@ -7,8 +7,7 @@
 #include <type_traits>
 
 #include "abs_hil/rig/option_check.hpp"
-#include "interchange/fmu/controller_model.hpp"
-#include "interchange/fmu/plant_model.hpp"
+#include "interchange/fmu/models.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::interchange::fmu {

@@ -16,7 +16,7 @@ from ..options import Value, program, text_of
 from .environment import Braking, check_options
 from .rigs import CHANGE_PRICE, END_SPEED_M_S, FAULT_REWARD, HIGH, LOW
 
-#: AgentPage of extras/interchange/agent_controller.hpp
+#: AgentPage of extras/interchange/agent_controller.cpp
 MARK = b'absagt01'
 PAGE_BYTES = 4096
 ACTION_AT, VERSION_AT, VALUES_AT = 16, 24, 32

@@ -24,7 +24,7 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/monotonic_time.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::can {
 

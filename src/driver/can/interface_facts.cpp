@@ -14,7 +14,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/can/bus.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::can {
 

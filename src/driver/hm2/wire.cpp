@@ -1,5 +1,4 @@
 // LBP16 packets and the UDP socket.
-
 #include "driver/hm2/wire.hpp"
 
 #include <arpa/inet.h>
@@ -12,7 +11,6 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
-#include "rig/error_words.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::hm2 {

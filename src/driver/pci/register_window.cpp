@@ -14,7 +14,7 @@
 
 #include "driver/pci/wire.hpp"
 #include "driver/sysfs.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
 

@@ -16,7 +16,6 @@
 #include "driver/board_kit.hpp"
 #include "driver/board_options.hpp"
 #include "driver/file_descriptor.hpp"
-#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
 

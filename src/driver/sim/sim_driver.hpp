@@ -5,7 +5,7 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "driver/board_kit.hpp"
-#include "driver/pwm.hpp"
+#include "driver/board_options.hpp"
 #include "plant_sim/encoder.hpp"
 
 namespace abs_hil::driver {

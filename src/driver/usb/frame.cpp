@@ -1,5 +1,5 @@
 // Puts outputs into a frame and takes measurements out of one.
-#include "driver/pwm.hpp"
+#include "driver/board_options.hpp"
 #include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {

@@ -16,7 +16,7 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/usb/wire.hpp"
-#include "rig/error_words.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "driver/pwm.hpp"
+#include "driver/board_options.hpp"
 #include "driver/usb/wire.hpp"
 
 namespace abs_hil::driver::usb {

@@ -8,10 +8,10 @@
 #include <sstream>
 #include <string_view>
 
-#include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/flight_record.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::experiment::test {
 
