@@ -7,6 +7,7 @@
 
 namespace {
 
+using namespace abs_hil;
 using namespace abs_hil::study;
 
 abs_hil::config::Settings settings_of(const char* controller) {

@@ -20,7 +20,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
-#include "config/model.hpp"
+#include "config/merge.hpp"
 #include "driver/spawn.hpp"
 #include "program/subcommands.hpp"
 #include "run/parallel.hpp"

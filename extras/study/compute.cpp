@@ -18,7 +18,7 @@
 #include "config/script.hpp"
 #include "rig/formatted_text.hpp"
 #include "run/parallel.hpp"
-#include "run/run_summary.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::study {
 

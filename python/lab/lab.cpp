@@ -22,7 +22,7 @@
 #include "files.hpp"
 #include "rig/gate_counts.hpp"
 #include "rig/record_sink.hpp"
-#include "run/run_summary.hpp"
+#include "run/run.hpp"
 #include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::lab {

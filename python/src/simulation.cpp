@@ -19,7 +19,7 @@
 #include "config/config_error.hpp"
 #include "interruptible.hpp"
 #include "run/parallel.hpp"
-#include "run/run_summary.hpp"
+#include "run/run.hpp"
 #include "study/batch.hpp"
 #include "study/variation.hpp"
 

@@ -17,7 +17,6 @@
 #include "config/board_policy.hpp"
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
-#include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
 #include "rig/formatted_text.hpp"

@@ -1,6 +1,4 @@
 // Where the model differs from the plant, and settings that look like a mistake, in words.
-#include "config/model.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "config/key_table.hpp"
+#include "config/merge.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::config {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "control/adaptive_gains.hpp"
-#include "control/rig_scale.hpp"
+#include "control/wheel_force_observer.hpp"
 
 namespace abs_hil::control {
 namespace {

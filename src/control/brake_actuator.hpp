@@ -77,8 +77,6 @@ class BasicBrakeActuator {
   [[nodiscard]] S static_torque_Nm(const S& duty, const S& torque_Nm) const noexcept {
     return rig::select(ideal_ > 0.0, rig::larger(S(0.0), torque_Nm), rig::brake_torque_at(brake_, duty));
   }
-  /// Static torque of the duty that acts: without dead time, of the last `command`.
-  [[nodiscard]] S sent_torque_Nm() const noexcept { return target_Nm_; }
   /// Largest torque that can be sent; infinite if ideal.
   [[nodiscard]] S max_torque_Nm() const noexcept { return max_torque_Nm_; }
   [[nodiscard]] S torque_Nm() const noexcept { return torque_Nm_; }            ///< estimated, now

@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <stdexcept>
 
-#include "control/rig_scale.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {

@@ -12,6 +12,20 @@
 
 namespace abs_hil::control {
 
+// How large a rig's forces are, against those of the paper's rig, for which gains that carry units were chosen.
+
+/// Wheels decelerate by much the same m/s^2 on every rig, so forces are in proportion to the mass J2/r2^2 that the
+/// lower wheel stands for, and torques to that times r1. Both are exactly 1 for the paper's wheels.
+struct RigScale {
+  double force{1.0};
+  double torque{1.0};
+};
+[[nodiscard]] constexpr RigScale rig_scale(const rig::WheelParameters& w) noexcept {
+  const rig::WheelParameters paper{};
+  const double force = (w.J2_kg_m2 / (w.r2_m * w.r2_m)) / (paper.J2_kg_m2 / (paper.r2_m * paper.r2_m));
+  return {.force = force, .torque = force * (w.r1_m / paper.r1_m)};
+}
+
 /// Estimates the speeds of both wheels and the tyre force between them from both encoders and the modelled brake
 /// torque. It is a steady-state Kalman filter on (1)-(2),
 ///   J1 omega1' = r1 F - d1 omega1 - M10 - (Tb + D),   J2 omega2' = -r2 F - d2 omega2 - M20,   F' = noise,  D' = noise,

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plant_sim/stepping.hpp"
+#include "plant_sim/torque_balance.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {

@@ -1,10 +1,9 @@
 // Rolls while both wheels turn on an even road, slides to the next event otherwise.
-#include "plant_sim/stepping.hpp"
-
 #include <algorithm>
 #include <cmath>
 
 #include "plant_sim/runge_kutta.hpp"
+#include "plant_sim/torque_balance.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {

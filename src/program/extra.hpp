@@ -1,9 +1,9 @@
-// What an extra brings to the program and to a run. Extras are the rooms of extras/ (cmake/Rooms.cmake), which a
-// laboratory may leave out. No file of src includes one: the build makes the list of those that it has
-// (cmake/Extras.cmake).
+// What an extra (a room of extras/, which a laboratory may leave out) brings to the program and to a run. No file of src
+// includes one: the build makes the list of those that it has (cmake/Extras.cmake).
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -40,13 +40,8 @@ class RunPart {
   [[nodiscard]] virtual nlohmann::ordered_json controller_facts() const { return nullptr; }
 };
 
-/// Hears a stop between two runs of a series.
-class PauseListener {
- public:
-  virtual ~PauseListener() = default;
-  /// @param time_s  time since the pause began
-  [[nodiscard]] virtual bool stop_heard(std::chrono::steady_clock::time_point now, double time_s) = 0;
-};
+/// Between two runs of a series: true once a stop is heard. @param time_s  time since the pause began
+using StopHeard = std::function<bool(std::chrono::steady_clock::time_point now, double time_s)>;
 
 /// One extra: a row of what it brings. Null: nothing.
 struct Extra {
@@ -54,7 +49,7 @@ struct Extra {
   std::span<const Subcommand> subcommands{};
   void (*begin)(){nullptr};  ///< called once, before the command line is read
   std::unique_ptr<RunPart> (*join)(const RunRequest& request){nullptr};
-  std::unique_ptr<PauseListener> (*pause)(const RunRequest& request){nullptr};
+  StopHeard (*pause)(const RunRequest& request){nullptr};
 };
 
 /// The extras of this build. Real-time safe.

@@ -29,7 +29,6 @@
 #include "program/run_outputs.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
-#include "run/run_summary.hpp"
 #include "runtime/record_pump.hpp"
 
 namespace abs_hil::program {

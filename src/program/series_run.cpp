@@ -129,7 +129,7 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
 /// @return the reason to end the series; `none` after the whole pause
 /// Throws telemetry::LcmError without a network.
 rig::Reason pause_between_runs(const RunRequest& run, double duration_s) {
-  std::vector<std::unique_ptr<PauseListener>> listeners;
+  std::vector<StopHeard> listeners;
   for (const Extra* extra : extras()) {
     if (extra->pause != nullptr && !run.outputs.no_lcm) listeners.push_back(extra->pause(run));
   }
@@ -138,7 +138,7 @@ rig::Reason pause_between_runs(const RunRequest& run, double duration_s) {
     const auto now = Clock::now();
     const double time_s = std::chrono::duration<double>(now - start).count();
     if (signalled() != rig::Reason::none) return signalled();
-    if (std::ranges::any_of(listeners, [&](const auto& one) { return one->stop_heard(now, time_s); })) {
+    if (std::ranges::any_of(listeners, [&](const auto& one) { return one(now, time_s); })) {
       return rig::Reason::stop_command;
     }
     if (time_s >= duration_s) return rig::Reason::none;

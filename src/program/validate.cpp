@@ -10,7 +10,7 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "config/config_error.hpp"
-#include "config/model.hpp"
+#include "config/merge.hpp"
 #include "config/plan.hpp"
 #include "files/result_file.hpp"
 #include "program/subcommands.hpp"

@@ -1,6 +1,4 @@
 // The summary of a run as JSON, and whole runs in virtual time.
-#include "run/run_summary.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -9,8 +7,9 @@
 
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
-#include "config/model.hpp"
+#include "config/merge.hpp"
 #include "rig/reason_text.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::run {
 

@@ -1,7 +1,5 @@
 // The model that controllers believe in, apart from the simulated plant.
 
-#include "config/model.hpp"
-
 #include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -10,6 +8,7 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
+#include "config/merge.hpp"
 #include "config/plan.hpp"
 #include "temporary_folder.hpp"
 

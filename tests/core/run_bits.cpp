@@ -16,7 +16,7 @@
 #include "config/config_file.hpp"
 #include "config/merge.hpp"
 #include "rig/record_sink.hpp"
-#include "run/run_summary.hpp"
+#include "run/run.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
 

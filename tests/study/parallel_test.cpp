@@ -7,7 +7,7 @@
 
 #include "catch.hpp"
 
-using namespace abs_hil::study;
+using namespace abs_hil;
 
 TEST_CASE("each index is called once, with any number of threads") {
   for (const std::size_t threads : {0U, 1U, 2U, 7U, 64U}) {

@@ -61,6 +61,24 @@ TEST_CASE("commands count as long as they act") {
   CHECK(ideal.speed_window().brake_target_Nm == Approx(9.0));
 }
 
+TEST_CASE("a brake with dead time acts as late as that, and in parts of a window") {
+  rig::RigParameters late;
+  late.brake.brake_dead_time_s = 0.0035;
+  SpeedWindows maker(plausibility_limits(late, false, {}));
+  const auto window_to = [&maker](std::int64_t time_ns, double duty) {
+    static_cast<void>(maker.update(at(time_ns), time_ns, {.brake_duty = duty}));
+    return maker.speed_window().brake_target_Nm;
+  };
+  const double half_Nm = 15.24 * 0.5 - 6.21, full_Nm = 15.24 - 6.21;
+  static_cast<void>(window_to(1 * ms, 0.0));
+  CHECK(window_to(3 * ms, 0.5) == 0.0);                    // sent at 1 ms, acts from 4.5 ms on
+  CHECK(window_to(5 * ms, 1.0) == Approx(half_Nm / 4.0));  // sent at 3 ms, acts from 6.5 ms on
+  CHECK(window_to(7 * ms, 1.0) == Approx((3.0 * half_Nm + full_Nm) / 4.0));
+  CHECK(window_to(9 * ms, 0.0) == Approx(full_Nm));  // sent at 7 ms, acts from 10.5 ms on
+  CHECK(window_to(11 * ms, 0.0) == Approx(full_Nm * 0.75));
+  CHECK(window_to(13 * ms, 0.0) == 0.0);
+}
+
 TEST_CASE("no fresh measurement for 20 ms and five cycles is a fault") {
   SpeedWindows maker(limits());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
