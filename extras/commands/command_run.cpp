@@ -1,5 +1,4 @@
-// The extra "commands" in the program: commands over LCM during a run, between two runs of a series, and `abs_hil
-// send`.
+// The extra "commands" in the program: over LCM in a run, between two runs of a series, and `abs_hil send`.
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -66,8 +65,7 @@ class StopListener {
         stream_({.channel_prefix = run.settings.telemetry.channel_prefix}, {}, {}),
         commands_(lcm_, stream_, {}) {
     stream_.add(lcm_);
-    const config::CommandOptions& commands = run.settings.commands;
-    if (commands.enabled) sign_answers(stream_, read_key(commands.key_file));
+    if (run.settings.commands.enabled) sign_answers(stream_, read_key(run.settings.commands.key_file));
     commands_.set_judge([](const command_t& command) {
       const std::string shown = rig::clean_text(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,

@@ -1,5 +1,5 @@
-// What an extra (a room of extras/, which a laboratory may leave out) brings to the program and to a run. No file of src
-// includes one: the build makes the list of those that it has (cmake/Extras.cmake).
+// What an extra (a room of extras/, which a laboratory may leave out) brings to the program and to a run. No file of
+// src includes one: the build makes the list of those that it has (cmake/Extras.cmake).
 #pragma once
 
 #include <chrono>
@@ -54,8 +54,5 @@ struct Extra {
 
 /// The extras of this build. Real-time safe.
 [[nodiscard]] std::span<const Extra* const> extras() noexcept;
-/// Parts of the extras that take part in this run. Throws config::ConfigError if the run needs an extra that this build
-/// lacks.
-[[nodiscard]] std::vector<std::unique_ptr<RunPart>> run_parts(const RunRequest& request);
 
 }  // namespace abs_hil::program

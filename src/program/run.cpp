@@ -140,6 +140,22 @@ void require_own_guardian(const driver::DriverOptions& board) {
                             rig::refusal(errno, program, rig::starting));
 }
 
+/// The extras' parts in this run. Throws config::ConfigError if it needs an extra that this build lacks.
+std::vector<std::unique_ptr<RunPart>> run_parts(const RunRequest& request) {
+  if (request.settings.commands.enabled &&
+      std::ranges::find(extras(), std::string_view("commands"), &Extra::name) == extras().end()) {
+    throw config::ConfigError(
+        "commands.enabled = true, but this abs_hil was built without the extra \"commands\"; leave the key out, or "
+        "build "
+        "with -DABS_HIL_COMMANDS=ON");
+  }
+  std::vector<std::unique_ptr<RunPart>> parts;
+  for (const Extra* extra : extras()) {
+    if (extra->join != nullptr) parts.push_back(extra->join(request));
+  }
+  return parts;
+}
+
 /// Writes the run's files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
 int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& outcome, RunOutputs& outputs,
@@ -214,21 +230,6 @@ void require_resources(run::Run& run, bool has_lease) {
   // Uses a thread of its own: its scheduling class disappears with it.
   std::jthread([&] { report = runtime::RealtimeScope(s.realtime).report(); }).join();
   if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
-}
-
-std::vector<std::unique_ptr<RunPart>> run_parts(const RunRequest& request) {
-  if (request.settings.commands.enabled &&
-      std::ranges::find(extras(), std::string_view("commands"), &Extra::name) == extras().end()) {
-    throw config::ConfigError(
-        "commands.enabled = true, but this abs_hil was built without the extra \"commands\"; leave the key out, or "
-        "build "
-        "with -DABS_HIL_COMMANDS=ON");
-  }
-  std::vector<std::unique_ptr<RunPart>> parts;
-  for (const Extra* extra : extras()) {
-    if (extra->join != nullptr) parts.push_back(extra->join(request));
-  }
-  return parts;
 }
 
 int run(const RunRequest& request) {
