@@ -52,10 +52,11 @@ endfunction()
 
 # Adds the libraries of all rooms of this build but those given.
 macro(abs_hil_add_rooms)
+  set(rooms_not_added ${ARGN})
   foreach(room IN LISTS ABS_HIL_ROOM_NAMES)
     if(room STREQUAL lcmtypes)
       add_subdirectory(lcmtypes)
-    elseif(NOT room STREQUAL driver_sim AND NOT "${room}" IN_LIST ARGN)  # driver_sim comes with driver
+    elseif(NOT room STREQUAL driver_sim AND NOT room IN_LIST rooms_not_added)  # driver_sim comes with driver
       abs_hil_room_sources(folder ${room})
       add_subdirectory(${folder})
     endif()
