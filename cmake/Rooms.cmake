@@ -33,7 +33,6 @@ set(ABS_HIL_ROOM_TABLE
 # which saves about a third of their compile time.
 set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files emulator guardian analysis run_folder diagnosis config study commands replay interchange program)
 
-# Rooms of extras/, each with a switch: -DABS_HIL_STUDY=OFF leaves one out, -DABS_HIL_EXTRAS=OFF all. Those with a part in the
-# program abs_hil define an `Extra` (src/program/extra.hpp).
+# Rooms of extras/, each with a switch: -DABS_HIL_STUDY=OFF leaves one out, -DABS_HIL_EXTRAS=OFF all. One that knows the
+# program has a part in it and defines an `Extra` (src/program/extra.hpp).
 set(ABS_HIL_EXTRA_ROOMS emulator study commands replay interchange)
-set(ABS_HIL_EXTRAS_OF_PROGRAM study commands replay interchange)

@@ -12,9 +12,8 @@
 
 namespace abs_hil::control {
 
-// How large a rig's forces are, against those of the paper's rig, for which gains that carry units were chosen.
-
-/// Wheels decelerate by much the same m/s^2 on every rig, so forces are in proportion to the mass J2/r2^2 that the
+/// How large a rig's forces are, against those of the paper's rig, for which gains that carry units were chosen. Wheels
+/// decelerate by much the same m/s^2 on every rig, so forces are in proportion to the mass J2/r2^2 that the
 /// lower wheel stands for, and torques to that times r1. Both are exactly 1 for the paper's wheels.
 struct RigScale {
   double force{1.0};

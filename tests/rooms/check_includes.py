@@ -24,7 +24,7 @@ LIBRARIES = {
 PURE = {'rig', 'control', 'plant_sim'}
 # What the emulators' program may have of the drivers: nothing about a board
 OF_DRIVERS = {'driver/file_descriptor.hpp', 'driver/monotonic_time.hpp'}
-EXTRAS = {'emulator', 'study', 'commands', 'replay', 'interchange'}
+EXTRAS = {folder.name for folder in (pathlib.Path(__file__).resolve().parents[2] / 'extras').iterdir()}
 IMPURE_HEADER = re.compile(r'^(chrono|ctime|time\.h|thread|mutex|fstream|iostream|filesystem|unistd\.h|fcntl\.h|sys/.*)$')
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
