@@ -9,7 +9,7 @@ from dense import Grid, certify  # noqa: E402
 
 from abs_hil.optimum import END_SPEED_M_S, Rig, optimum, trajectory  # noqa: E402
 from abs_hil.optimum.guess import Guesser, Policy  # noqa: E402
-from abs_hil.optimum.road import Piece  # noqa: E402
+from abs_hil.optimum.rig import Piece  # noqa: E402
 
 #: coarse: on a steep curve it would need more slips
 SMALL = Grid(slips=30, torques=12, layer_rad_s=2.0, layer_share=0.1)

@@ -15,7 +15,7 @@ from dense import Grid, certify  # noqa: E402
 
 from abs_hil import Plant  # noqa: E402
 from abs_hil.optimum import END_SPEED_M_S, Rig, drivers, optimum  # noqa: E402
-from abs_hil.optimum.road import Piece  # noqa: E402
+from abs_hil.optimum.rig import Piece  # noqa: E402
 
 SMALL = certificate.Grid(slips=40, torques=20, layer_s=4e-3)
 

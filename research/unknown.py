@@ -32,8 +32,7 @@ import casadi as ca
 import numpy as np
 
 from abs_hil.optimum.guess import Guesser, Policy
-from abs_hil.optimum.rig import DISTANCE, OMEGA2, SLIP, Rig
-from abs_hil.optimum.road import Piece
+from abs_hil.optimum.rig import DISTANCE, OMEGA2, SLIP, Piece, Rig
 from abs_hil.optimum.trajectory import POINTS, SCALE, SHORTEST_S, SLOPES, SMOOTHNESS, SOLVER, NoOptimum, _mesh
 
 PERIOD_S = 1e-3

@@ -22,7 +22,7 @@ from unknown import PERIOD_S, bound, ignorance, of_roads, of_tyres_parting  # no
 
 from abs_hil.benchmark import Case, Entry, bounds, cases, run  # noqa: E402
 from abs_hil.optimum import Rig, optimum  # noqa: E402
-from abs_hil.optimum.road import road_of  # noqa: E402
+from abs_hil.optimum.rig import road_of  # noqa: E402
 
 LAW = 'adaptive-optimal'
 THETA_N, B = (10.0, 60.0), (10.0, 40.0)  # what the benchmark draws

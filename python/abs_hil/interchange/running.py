@@ -131,23 +131,10 @@ class Recorder(Translator):
         self._mcap.finish()
 
 
-class Foxglove(Translator):
+class Foxglove(Topics):
     """The same messages as an MCAP file's, live, for Foxglove, Lichtblick and PlotJuggler: the protocol foxglove.sdk.v1 by the
     package foxglove-sdk, whose threads are this process's only. Serves from now on. Raises ImportError without the package,
     OSError if the port cannot be used."""
-
-    def __init__(self, port: int) -> None:
-        self._channels = Channels(port)
-        super().__init__(self._channels)
-        self._channels.add(EVENT_TOPIC, LOG_TYPE, LOG_DEFINITION)  # now, so that a viewer gets the first one
-        self.link = f'ws://{HOST}:{self._channels.server.port}'
-
-    def stop(self) -> None:
-        self._channels.server.stop()
-
-
-class Channels(Topics):
-    """The topics of one server."""
 
     def __init__(self, port: int) -> None:
         try:
@@ -165,6 +152,9 @@ class Channels(Topics):
                                                      context=self._context, message_backlog_size=BACKLOG)
         except RuntimeError as error:
             raise OSError(f'--foxglove cannot listen at {HOST}, port {port}: {error}; give another port') from None
+        self.link = f'ws://{HOST}:{self.server.port}'
+        self.translate = Translator(self).translate
+        self.add(EVENT_TOPIC, LOG_TYPE, LOG_DEFINITION)  # now, so that a viewer gets the first one
 
     def wants(self, topic: str) -> bool:
         return topic in self.channels and bool(self.channels[topic].has_sinks())

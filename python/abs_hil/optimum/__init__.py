@@ -3,8 +3,7 @@ from collections.abc import Mapping
 
 from ..options import PathLike, Value
 from .drivers import Driven, causal, drive, preview
-from .rig import Rig
-from .road import road_of
+from .rig import Rig, road_of
 from .trajectory import NoOptimum, Trajectory
 
 __all__ = ['Driven', 'END_SPEED_M_S', 'NoOptimum', 'Rig', 'START_SPEED_RAD_S', 'Trajectory', 'drive', 'optimum']

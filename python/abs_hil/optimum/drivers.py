@@ -9,8 +9,7 @@ import numpy as np
 
 from ..options import PathLike, Value
 from ..stepped import Plant
-from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Rig
-from .road import Piece
+from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Piece, Rig
 from .trajectory import NoOptimum, Trajectory, solve
 
 #: on a road that changes in a straight line the causal braking is planned again this often, s

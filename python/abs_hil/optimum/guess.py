@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Rig
-from .road import Piece
+from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Piece, Rig
 
 #: of the integration where the slip settles fastest, and the speed of the lower wheel above which it grows with that speed
 STEP_S = 2.5e-4
@@ -136,9 +135,7 @@ class Guesser:
     def _done(self, piece: Piece, last: bool, now_s: float, x: np.ndarray, end_speed_m_s: float) -> bool:
         if last:
             return bool(self._rig['r2_m'] * x[OMEGA2] <= end_speed_m_s)
-        if piece.along == 'time':
-            return now_s >= piece.end - 1e-9
-        return bool(x[DISTANCE] >= piece.end)
+        return bool(now_s >= piece.end - 1e-9 if piece.along == 'time' else x[DISTANCE] >= piece.end)
 
 
 def policies(rig: Rig, start_speed_m_s: float) -> tuple[list[Policy], list[Policy]]:

@@ -1,18 +1,20 @@
-"""The rig's equations (1), (2), (6), (7) as CasADi expressions, with the values of a plant of ours."""
+"""The rig's equations (1), (2), (6), (7) as CasADi expressions, with the values of a plant of ours, and its road."""
 import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import casadi as ca
 import numpy as np
 
+from ..core import _core
 from ..simulation import keys
 
 #: indices of the state: slip, speed of the lower wheel, brake torque, distance. With the slip in the place of the upper
 #: wheel's speed the solver sees the fast motion at its own scale.
 SLIP, OMEGA2, TORQUE, DISTANCE = range(4)
+Number = TypeVar('Number', float, ca.SX)
 
 
 @dataclass(frozen=True)
@@ -125,11 +127,8 @@ class Rig:
 
     def rates(self, x: Any, torque_rate_Nm_s: Any, friction: Any, stands: bool = False) -> Any:
         """Time derivative of the state. stands: the brake holds the upper wheel, so the slip stays 1."""
-        if stands:
-            _, lower = self.wheel_rates(x, self.standing_force_N(friction))
-            return ca.vertcat(0.0, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
-        upper, lower = self.wheel_rates(x, self.force_N(x, friction))
-        slip_rate = ((1.0 - x[SLIP]) * lower - self['r1_m'] / self['r2_m'] * upper) / x[OMEGA2]
+        upper, lower = self.wheel_rates(x, self.standing_force_N(friction) if stands else self.force_N(x, friction))
+        slip_rate = 0.0 if stands else ((1.0 - x[SLIP]) * lower - self['r1_m'] / self['r2_m'] * upper) / x[OMEGA2]
         return ca.vertcat(slip_rate, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
 
     def rates_function(self, stands: bool = False) -> ca.Function:
@@ -139,3 +138,32 @@ class Rig:
     def force_function(self) -> ca.Function:
         x, f = ca.SX.sym('x', 4), ca.SX.sym('f')
         return ca.Function('force', [x, f], [self.force_N(x, f)])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of road on which the friction is `value` + `slope` (position - `begin`).
+
+    along:  'time' or 'distance' since the start of braking: the unit of the position, s or m.
+    end:    its last position; infinite for the piece on which the car stops.
+    """
+    value: float
+    slope: float = 0.0
+    begin: float = 0.0
+    end: float = math.inf
+    along: str = 'time'
+
+    def friction(self, time_s: Number, distance_m: Number) -> Number | float:
+        if self.slope == 0.0:
+            return self.value
+        return self.value + self.slope * ((time_s if self.along == 'time' else distance_m) - self.begin)
+
+
+def road_of(rig: Rig) -> list[Piece]:
+    """The pieces of the plant's friction profile. Braking begins at once, so both origins of a profile are the same."""
+    text = str(rig.values['friction_profile'])
+    if not text:
+        return [Piece(1.0)]
+    axis, _, parts = _core.profile_of(text, 'plant.friction_profile')
+    ends = [begin for begin, _, _ in parts[1:]] + [math.inf]
+    return [Piece(value, slope, begin, end, axis) for (begin, value, slope), end in zip(parts, ends)]

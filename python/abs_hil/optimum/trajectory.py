@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 
 from .guess import Guesser, Phase, policies
-from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Rig
-from .road import Piece
+from .rig import DISTANCE, OMEGA2, SLIP, TORQUE, Piece, Rig
 
 #: degree of the collocation polynomials; the error of a state falls with the fifth power of the interval
 DEGREE = 3

@@ -93,4 +93,4 @@ async def _serve(given: Any, source: Any) -> int:
     finally:
         await server.stop()
         if foxglove is not None:
-            foxglove.stop()
+            foxglove.server.stop()

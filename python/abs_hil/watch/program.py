@@ -4,6 +4,7 @@ import os
 import re
 import select
 import signal
+import sys
 import termios
 import time
 import tty
@@ -24,10 +25,6 @@ DRAW_PERIOD_S = 0.2
 LINE_PERIOD_S = 1.0
 PICTURE = (100, 32)  # columns and rows of --once
 ENDING = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 143, signal.SIGQUIT: 131}
-
-
-class Ended(Exception):
-    """A signal ends the program."""
 
 
 class Feed:
@@ -121,28 +118,22 @@ def main(arguments: list[str]) -> int:
         p.error(f"--prefix '{o.prefix}': give at most 48 letters, digits, '_', '-' and '/'")
     locale = os.environ.get('LC_ALL') or os.environ.get('LC_CTYPE') or os.environ.get('LANG') or ''
     unicode = not o.ascii and 'utf' in locale.lower()
-    status = 0
 
     def end(number: int, _frame: object) -> None:
-        nonlocal status
-        status = ENDING[signal.Signals(number)]
-        raise Ended
+        sys.exit(ENDING[signal.Signals(number)])
 
     for number in ENDING:
         signal.signal(number, end)
     try:
-        try:
-            feed = Feed(o.lcm_url, o.prefix, o.window)
-        except (ValueError, OSError) as error:
-            return failed('abs_watch', error, 3 if isinstance(error, OSError) else 2)
-        screen = Screen(*PICTURE, unicode, feed.url, f'{o.prefix}TELEMETRY')
-        if o.once:
-            if not one_picture(feed, screen, timeout_s):
-                return failed('abs_watch', f'no message arrived within {timeout_s:g} s on {screen.channel}', 3)
-        elif o.plain or not (os.isatty(0) and os.isatty(1)) or os.environ.get('TERM', 'dumb') in ('dumb', 'unknown', ''):
-            in_lines(feed, screen)
-        else:
-            on_terminal(feed, screen)
-    except Ended:
-        return status
+        feed = Feed(o.lcm_url, o.prefix, o.window)
+    except (ValueError, OSError) as error:
+        return failed('abs_watch', error, 3 if isinstance(error, OSError) else 2)
+    screen = Screen(*PICTURE, unicode, feed.url, f'{o.prefix}TELEMETRY')
+    if o.once:
+        if not one_picture(feed, screen, timeout_s):
+            return failed('abs_watch', f'no message arrived within {timeout_s:g} s on {screen.channel}', 3)
+    elif o.plain or not (os.isatty(0) and os.isatty(1)) or os.environ.get('TERM', 'dumb') in ('dumb', 'unknown', ''):
+        in_lines(feed, screen)
+    else:
+        on_terminal(feed, screen)
     return 0
