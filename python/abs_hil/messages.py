@@ -24,8 +24,7 @@ for _module in pkgutil.iter_modules(folders()):
 
 
 def _table(name: str, key: str) -> dict[Any, dict[str, Any]]:
-    rows = json.loads(place_of(name).read_text(encoding='utf-8'))
-    return {row[key]: row for row in rows}
+    return {row[key]: row for row in json.loads(place_of(name).read_text(encoding='utf-8'))}
 
 
 #: name -> unit, type, meaning and so on of every quantity of a cycle, in the order of the CSV columns

@@ -1,6 +1,5 @@
-"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab, abs_log, abs_rig. `abs_hil report ...` starts them too. abs_hil
-itself starts abs_compare_tables and abs_python_host."""
+"""The programs in Python: abs_NAME, which `abs_hil NAME` starts too, for each name of PROGRAMS but the last two: abs_hil itself
+starts those."""
 import codecs
 import contextlib
 import errno
@@ -16,14 +15,10 @@ from . import parsers
 from .places import misfit
 
 #: name -> module with main(arguments) -> exit status
-PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.training',
-            'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
-            'convert': 'abs_hil.interchange.recorded', 'watch': 'abs_hil.watch.program',
-            'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
-            'lab': 'abs_hil.lab.page', 'log': 'abs_hil.log', 'rig': 'abs_hil.rig', 'compare_tables': 'abs_hil.compare',
-            'python_host': 'abs_hil.interchange.host'}
-
-
+PROGRAMS = {'report': '.report.program', 'tune': '.tune', 'learn': '.learning.training', 'identify': '.identification.program',
+            'benchmark': '.benchmark.program', 'convert': '.interchange.recorded', 'watch': '.watch.program',
+            'export-fmu': '.interchange.export_fmu', 'serve': '.serve.program', 'lab': '.lab.page', 'log': '.log', 'rig': '.rig',
+            'compare_tables': '.compare', 'python_host': '.interchange.host'}
 #: for encodings without them
 _PLAIN = {'\u2212': b'-', '–': b'-', '×': b'x', '…': b'...'}
 
@@ -92,7 +87,7 @@ def _start(name: str, arguments: list[str]) -> int:
             return 0
         getattr(parsers, name.replace('-', '_'))().parse_args(arguments)  # --help and wrong options end here, without a package
         with contextlib.redirect_stderr(said):
-            main = importlib.import_module(PROGRAMS[name]).main
+            main = importlib.import_module(PROGRAMS[name], __package__).main
         print(end=said.getvalue(), file=sys.stderr)
         return int(main(arguments))
     except SystemExit as end:  # of argparse

@@ -167,27 +167,21 @@ class Motion:
 
 
 def motion_of(log: Log, counts_per_rev: int) -> Motion:
-    per_count = 2 * np.pi / counts_per_rev
-    rows = len(log)
-    half = max(2, round(HALF_WIDTH_S / log.period_s))
-    width = 2 * half + 1
-    grid = np.linspace(log.time_s[0], log.time_s[-1], rows)
-    smooth, speed = np.empty((rows, 2)), np.empty((rows, 2))
-    angle, weight, stands = np.empty((rows, 2)), np.empty((rows, 2)), np.empty((rows, 2), dtype=bool)
-    around = max(1, round(STANDS_S / log.period_s))
-    for wheel in range(2):
-        counts = log.counts[:, wheel]
+    width = 2 * max(2, round(HALF_WIDTH_S / log.period_s)) + 1
+    around = 2 * max(1, round(STANDS_S / log.period_s)) + 1
+    grid = np.linspace(log.time_s[0], log.time_s[-1], len(log))
+    delta = (grid[-1] - grid[0]) / (len(log) - 1)
+    columns = []
+    for counts, late_s in zip(log.counts.T, log.read_late_s.T):
         known = np.isfinite(counts)
-        filled = np.interp(log.time_s, log.time_s[known], counts[known] + 0.5) * per_count
+        filled = np.interp(log.time_s, log.time_s[known], counts[known] + 0.5) * (2 * np.pi / counts_per_rev)
         even = np.interp(grid, log.time_s, filled)
-        smooth[:, wheel] = np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2))
-        delta = (grid[-1] - grid[0]) / (rows - 1)
-        speed[:, wheel] = np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2, deriv=1, delta=delta))
-        angle[:, wheel] = np.where(known, filled, np.nan) - log.read_late_s[:, wheel] * speed[:, wheel]
-        weight[:, wheel] = np.where(known, _weights(np.where(known, counts, -1e18)), 0.0)
-        stands[:, wheel] = (scipy.ndimage.maximum_filter1d(filled, 2 * around + 1)
-                            == scipy.ndimage.minimum_filter1d(filled, 2 * around + 1))
-    return Motion(angle, smooth, speed, weight, stands)
+        smooth, speed = (np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2, deriv=order, delta=delta))
+                         for order in (0, 1))
+        stands = scipy.ndimage.maximum_filter1d(filled, around) == scipy.ndimage.minimum_filter1d(filled, around)
+        columns.append((np.where(known, filled, np.nan) - late_s * speed, smooth, speed,
+                        np.where(known, _weights(np.where(known, counts, -1e18)), 0.0), stands))
+    return Motion(*(np.stack(column, axis=1) for column in zip(*columns)))
 
 
 def _weights(counts: np.ndarray) -> np.ndarray:

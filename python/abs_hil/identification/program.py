@@ -42,7 +42,8 @@ class Progress:
         if not self._terminal or now - self._drawn < DRAW_S:
             return
         self._drawn = now
-        self._stream.write(f'\r\x1b[K{duration(now - self._begin)}')
+        passed_s = now - self._begin
+        self._stream.write('\r\x1b[K' + (f'{passed_s:.0f} s' if passed_s < 90.0 else f'{passed_s / 60.0:.0f} min'))
         self._stream.flush()
 
     def end(self) -> None:
@@ -55,10 +56,6 @@ class Progress:
             self._stream.write('\r\x1b[K')
             self._stream.flush()
         self._drawn = 0.0
-
-
-def duration(seconds: float) -> str:
-    return f'{seconds:.0f} s' if seconds < 90.0 else f'{seconds / 60.0:.0f} min'
 
 
 def _fixed(texts: list[str]) -> dict[str, float | None]:

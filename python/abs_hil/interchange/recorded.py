@@ -1,5 +1,6 @@
 """abs_convert: runs as files for other tools, with everything that stands beside their rows and what is missing; `abs_hil convert`
 starts it."""
+import contextlib
 import datetime
 import errno
 import json
@@ -80,12 +81,9 @@ def missing_rows(run: Run) -> list[str]:
 
 
 def _read_folder(folder: pathlib.Path, run: Run) -> None:
-    for name in ATTACHED:
-        if (folder / name).is_file():
-            run.attachments[name] = (folder / name).read_bytes()
+    run.attachments.update((name, (folder / name).read_bytes()) for name in ATTACHED if (folder / name).is_file())
     try:
-        ended = parse_json(run.attachments.get('environment.json', b'{}')).get('date_utc')
-        if ended:
+        if ended := parse_json(run.attachments.get('environment.json', b'{}')).get('date_utc'):
             end = datetime.datetime.strptime(ended, '%Y-%m-%dT%H:%M:%SZ').replace(tzinfo=datetime.UTC)
             run.start_ns = int(end.timestamp()) * 1_000_000_000 - round(float(run['time_s'][-1]) * 1e9)
     except (ValueError, AttributeError):
@@ -241,11 +239,9 @@ def _record(given: Any, output: pathlib.Path) -> str:
         nonlocal result
         with open(name, 'wb') as file:
             recorder = running.Recorder(McapFile(file, library='abs_hil'))
-            try:
+            with contextlib.suppress(KeyboardInterrupt):
                 for channel, message in running.received(given.live, given.prefix, given.idle, given.seconds):
                     recorder.take(channel, message)
-            except KeyboardInterrupt:
-                pass
             recorder.finish()
             if recorder.rows == 0:
                 raise ValueError(f'no telemetry of abs_hil came on {given.live or "the default network"}; `abs_hil doctor --only '

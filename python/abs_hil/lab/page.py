@@ -106,11 +106,8 @@ def read_exercise(path: pathlib.Path) -> dict[str, Any]:
 
 def module() -> bytes:
     """The simulation core as WebAssembly: installed beside this file, in the source tree where scripts/lab.sh makes it."""
-    places = [_FOLDER / 'abs_hil_lab.wasm']
-    if len(_FOLDER.parents) > 2:
-        places.append(_FOLDER.parents[2] / 'build' / 'lab' / 'abs_hil_lab.wasm')
-    for place in places:
-        if place.exists():
+    for folder in (_FOLDER, *(root / 'build' / 'lab' for root in _FOLDER.parents[2:3])):
+        if (place := folder / 'abs_hil_lab.wasm').exists():
             return place.read_bytes()
     raise Unavailable('the simulation core for browsers (abs_hil_lab.wasm) is missing; scripts/lab.sh in the source folder '
                       'makes it, in a few minutes')

@@ -104,11 +104,8 @@ def profiles_of(rows: Run, found: Survey, window: Window, most_stretches: int) -
         if braking_only:
             values = np.where(braking[inside], values, np.nan)
         relevant = values[judged[inside] & np.isfinite(values)]
-        profile = Profile(*thinned(time[inside] - part.zero_s, values, most_stretches))
-
-        if len(relevant):
-            profile.relevant = float(relevant.min()), float(relevant.max())
-        profiles[name] = profile
+        ends = [(float(relevant.min()), float(relevant.max()))] if len(relevant) else []
+        profiles[name] = Profile(*thinned(time[inside] - part.zero_s, values, most_stretches), *ends)
     return profiles
 
 
@@ -203,9 +200,8 @@ class FigureMaker:
                            int(DOUBLE_PX / PX_A_MARK))
 
     def _estimated(self, column: str) -> str:
-        if all(column in found.known for found in self.surveys):
-            return ''
-        return ' Runs without true values show estimates from the encoders.'
+        known = all(column in found.known for found in self.surveys)
+        return '' if known else ' Runs without true values show estimates from the encoders.'
 
     # ---- the figures
 

@@ -84,7 +84,7 @@ def read_toml(path: pathlib.Path) -> dict[str, str]:
 
 
 def read_histogram(path: pathlib.Path) -> Histogram:
-    bins: dict[int, list[int]] = {}
+    bins: list[list[float]] = []
     overflows = [0] * len(PARTS)
     title = '# Histogram Overflows:'
     for number, line in enumerate(read_text(path).splitlines(), 1):
@@ -103,11 +103,9 @@ def read_histogram(path: pathlib.Path) -> Histogram:
         if overflow:
             overflows = counts
         else:
-            bins[fields[0]] = [a + b for a, b in zip(bins.get(fields[0], [0] * len(PARTS)), counts)]
-    columns = np.zeros((len(PARTS), max(bins, default=-1) + 1))
-    for us, counts in bins.items():
-        columns[:, us] = counts
-    return Histogram(columns, overflows)
+            bins.append(list(map(float, fields[:1] + counts)))
+    us, *parts = np.reshape(bins, (-1, 1 + len(PARTS))).T
+    return Histogram(np.array([np.bincount(us.astype(int), part) for part in parts]), overflows)
 
 
 def _read_folder(run: RunFiles, folder: pathlib.Path) -> None:

@@ -54,8 +54,7 @@ def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict
         'x': numbers(curve.x), 'y': numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
         'xaxis': f'x{number}', 'yaxis': f'y{number}', 'showlegend': new_in_legend, 'legendgroup': _escaped(curve.group),
         'meta': {'run': curve.run + 1, 'quantity': curve.quantity, 'points': int(np.isfinite(curve.y).sum())}}
-    title = curve.title or panel.title
-    trace['hovertemplate'] = _escaped(f'{title} %{{y:.5~g}} {panel.unit}'.strip())
+    trace['hovertemplate'] = _escaped(f'{curve.title or panel.title} %{{y:.5~g}} {panel.unit}'.strip())
     if curve.drawn == 'line':
         dash = {'dash': ','.join(f'{length:g}px' for length in curve.style.dash)} if curve.style.dash else {}
         return {**trace, 'mode': 'lines', 'line': {'color': curve.style.colour, 'width': curve.style.width, **dash}}

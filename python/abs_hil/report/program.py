@@ -87,8 +87,7 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
              'events_left_out': left_out, 'differences': tables.differences_table(runs), 'timing': tables.timing_table(runs),
              'timing_figure': timing, 'environment': tables.environment_table(runs),
              'notes': tables.all_notes(runs, surveys, found.notes)}
-    every: list[Figure] = [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])]
-    return runs, surveys, every, parts
+    return runs, surveys, [*(part['figure'] for part in series), *figures, *([timing] if timing is not None else [])], parts
 
 
 def _choice(text: str) -> Choice:
@@ -140,10 +139,8 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
 def _print_rows(table: Table) -> None:
     lines = [table.header, *table.rows]
     widths = [max(map(len, column)) for column in zip(*lines)]
-    for line in lines:
-        first = line[0].ljust(widths[0])
-        rest = [cell.rjust(width) for cell, width in zip(line[1:], widths[1:])]
-        print('  '.join([first, *rest]).rstrip())
+    for first, *rest in lines:
+        print('  '.join([first.ljust(widths[0]), *map(str.rjust, rest, widths[1:])]).rstrip())
 
 
 def _report(o: argparse.Namespace) -> None:
@@ -152,12 +149,11 @@ def _report(o: argparse.Namespace) -> None:
     if not o.table:
         _check_replaceable(path, o.force)
     if o.merits:
-        refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
+        refuse_existing(o.merits, '--merits', o.force)
     with progress_shown(sys.stderr.isatty()) as progress:
         runs, surveys, figures, parts = make(o.runs, o.labels, o.title, choice, o.paper, progress)
     if o.merits:
-        frame = merits(runs, surveys)
-        write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))
+        write_whole(o.merits, lambda name: merits(runs, surveys).to_csv(name, index=False, na_rep='NaN'))
     if o.table:
         for part in parts['series']:
             _print_rows(part['groups'])

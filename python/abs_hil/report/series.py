@@ -99,11 +99,9 @@ def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys
     beside = 0.012 * (x_range[1] - x_range[0])
     panels = []
     for key, label in SHOWN.items():
-        metric = figures()[key]
-        values = [_values(metric, group, runs, surveys) for group in found.groups]
+        values = [_values(figures()[key], group, runs, surveys) for group in found.groups]
         every = [(place + beside, value) for place, some in zip(places, values) for value in some if math.isfinite(value)]
-        estimates = zip(places, map(of_mean, values))
-        means = [(place, mean, low, high) for place, (n, mean, _, low, high) in estimates if n > 1]
+        means = [(place, mean, low, high) for place, (n, mean, _, low, high) in zip(places, map(of_mean, values)) if n > 1]
         if not every:
             continue
         panel = Panel(Label.plain(label), height_px=130.0)

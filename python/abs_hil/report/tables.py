@@ -43,13 +43,9 @@ def _change(first: float, second: float) -> str:
 
 def _model_note(run: RunFiles) -> str:
     """Where the controllers' model differs from the simulated plant."""
-    notes = []
-    for key, value in sorted(run.config.items()):
-        name = key.removeprefix('model.')
-        plant = run.config.get(f'plant.{name}')
-        if name != key and plant is not None and plant != value:
-            notes.append(f'{name} {value} (plant {plant})')
-    return ', '.join(notes)
+    names = sorted(key.removeprefix('model.') for key in run.config if key.startswith('model.'))
+    beliefs = [(name, run.config[f'model.{name}'], run.config.get(f'plant.{name}')) for name in names]
+    return ', '.join(f'{name} {value} (plant {plant})' for name, value, plant in beliefs if plant not in (None, value))
 
 
 def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, str]:
@@ -155,8 +151,6 @@ def all_notes(runs: list[RunFiles], surveys: list[Survey], general: list[str]) -
     """The general notes, then notes about missing or unusual data of each run."""
     notes = list(general)
     for run, found in zip(runs, surveys):
-        own = list(run.notes)
-        if found.truncated:
-            own.append('the last row of the CSV is incomplete, as after a crash, and is left out')
-        notes += [f'{run.called}: {note}' for note in own + contradictions(run, found)]
+        cut = ['the last row of the CSV is incomplete, as after a crash, and is left out'] * found.truncated
+        notes += [f'{run.called}: {note}' for note in [*run.notes, *cut, *contradictions(run, found)]]
     return notes

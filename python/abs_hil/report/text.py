@@ -19,17 +19,12 @@ def clean(text: object, most: int = 200) -> str:
 
 def short_names(names: list[str], most: int) -> list[str]:
     """Names cut to `most` characters; names that would then look alike lose their common beginning instead."""
-    shorts = [clean(name, most) for name in names]
-    alike: dict[str, list[int]] = {}
-    for number, short in enumerate(shorts):
-        alike.setdefault(short, []).append(number)
-    for group in alike.values():
-        if len(group) == 1:
-            continue
-        alike_names = [names[number] for number in group]
-        begin = max(0, min(len(os.path.commonprefix(alike_names)), min(map(len, alike_names)) - 2))
-        for number in group:
-            shorts[number] = '…' + clean(names[number][begin:], most - 1)
+    cut = [clean(name, most) for name in names]
+    shorts = []
+    for name, short in zip(names, cut):
+        alike = [other for other, of_other in zip(names, cut) if of_other == short]
+        begin = max(0, min(len(os.path.commonprefix(alike)), min(map(len, alike)) - 2))
+        shorts.append(short if len(alike) == 1 else '…' + clean(name[begin:], most - 1))
     return shorts
 
 

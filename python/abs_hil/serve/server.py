@@ -99,8 +99,7 @@ class Server:
         for name in ('aiohttp.server', 'asyncio'):
             logging.getLogger(name).addFilter(is_our_fault)
         await self._runner.setup()
-        site = web.TCPSite(self._runner, self.host, self.port, shutdown_timeout=1.0)
-        await site.start()
+        await web.TCPSite(self._runner, self.host, self.port, shutdown_timeout=1.0).start()
         self.port = self._runner.addresses[0][1]
 
     async def stop(self) -> None:

@@ -39,34 +39,29 @@ class Trigger:
     def __init__(self, asked: dict[str, Any]) -> None:
         self._before, self._run = math.nan, -1  # the last value, and the run that it is of
         self._words: Callable[[np.ndarray], str] = lambda row: ''
+        #: of the signal's values one row earlier, its values, and the rows
+        self._hits: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
         kind = asked.get('on')
         if kind == 'level':
             self._signal, level, edge = text(asked, 'signal'), real(asked, 'level'), text(asked, 'edge')
             if edge not in ('rise', 'fall', 'either'):
                 raise Bad(f'edge "{edge}": give rise, fall or either')
-
-            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-                rise, fall = (before < level) & (values >= level), (before > level) & (values <= level)
-                return rise if edge == 'rise' else fall if edge == 'fall' else rise | fall
+            self._hits = lambda before, values, rows: (
+                (edge != 'fall') & (before < level) & (values >= level) | (edge != 'rise') & (before > level) & (values <= level))
         elif kind == 'phase':
             name = _one_of(asked, 'phase', PHASES)
             self._signal = 'phase_index'
             self._words = lambda row: dict(enumerate(PHASES)).get(int(row[PLACE['phase']]), '')
-
-            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-                changed = (values != before) & ~np.isnan(before)
-                return changed & (rows[:, PLACE['phase']] == PHASES.index(name)) if name else changed
+            self._hits = lambda before, values, rows: (values != before) & ~np.isnan(before) & (
+                not name or rows[:, PLACE['phase']] == PHASES.index(name))
         elif kind == 'event':
             name = _one_of(asked, 'event', REASON_KINDS)
             reasons = [number for number, row in REASONS.items() if number and name in ('', row['kind'])]
             self._signal = 'reason'
             self._words = lambda row: str(REASONS[int(row[PLACE['reason']])]['text'])
-
-            def hits(before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-                return np.isin(values, reasons)
+            self._hits = lambda before, values, rows: np.isin(values, reasons)
         else:
             raise Bad(f'on "{kind}": give level, phase or event')
-        self._hits = hits
 
     def look(self, run: RunFacts, rows: np.ndarray) -> dict[str, Any] | None:
         """What a viewer is told of the first cycle that meets it; None: none of these does."""
