@@ -6,12 +6,12 @@ import pytest
 
 from abs_hil.core import _core
 from abs_hil.identification.advice import log_of
+from abs_hil.identification.encoders import middles
 from abs_hil.identification.found import disagreement
 from abs_hil.identification.intervals import bootstrap
 from abs_hil.identification.linear import filtered, keep_normals, linearise, run_filter, solved, step
 from abs_hil.identification.parameters import ALL_FORMS, DELAY, FLAWS, FORMS
 from abs_hil.identification.problem import QUIET, Fit, Problem, pieces_of
-from abs_hil.identification.slots import middles
 
 FLAWED = {'brake_dead_time_s': 0.0124, 'brake_fading_per_J': 2e-4, 'brake_cooling_per_s': 0.3, 'brake_hysteresis': 0.05,
           'brake_curvature': 0.1, 'brake_release_ratio': 1.3, 'friction_fall_s_m': 0.01}

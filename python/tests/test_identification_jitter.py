@@ -8,7 +8,7 @@ import pytest
 import abs_hil
 from abs_hil.core import _core
 from abs_hil.identification.advice import log_of
-from abs_hil.identification.jitter import jitter_of
+from abs_hil.identification.encoders import jitter_of
 from abs_hil.identification.logs import Log, motion_of
 
 COUNTS_PER_REV = 4096

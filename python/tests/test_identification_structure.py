@@ -13,9 +13,9 @@ from abs_hil.core import _core
 from abs_hil.identification import program, structure
 from abs_hil.identification.advice import information, log_of
 from abs_hil.identification.brake_flaws import leaky
+from abs_hil.identification.encoders import middles, slots_of
 from abs_hil.identification.logs import motion_of
 from abs_hil.identification.results import as_toml
-from abs_hil.identification.slots import middles, slots_of
 from abs_hil.options import options
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / 'research'))

@@ -7,10 +7,10 @@ import numpy as np
 import scipy.stats
 
 from ..core import _core
+from .encoders import middles
 from .linear import filtered, solved, to_rest
 from .parameters import COMBINATIONS, WHEELS, disc_of
 from .problem import COUNT_VARIANCE, QUIET, Fit
-from .slots import middles
 
 REPLICATES = 80
 _BATCH = 20

@@ -16,10 +16,9 @@ import numpy as np
 from ..core import _core
 from ..options import options
 from .brake_flaws import brake_torques, with_flaws
-from .jitter import jitter_of
+from .encoders import Slots, jitter_of, slots_of, weighed
 from .logs import Log, Motion, motion_of, segments_of
 from .parameters import DELAY, FRICTION_FALL, JOINING, RATE_LIMIT, RELEASE, WHEELS, Form, Parameter, base_options, disc_of
-from .slots import Slots, slots_of, weighed
 
 #: an even distribution within one count, counts^2
 COUNT_VARIANCE = 1 / 12
@@ -81,7 +80,7 @@ class Piece:
 class Problem:
     """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
     keys of JOINING that are fitted; `slots` has the wheels whose discs have unequal ones; `jitter_s` is the
-    standard deviation of the readings' instants, `jitter_doubt` that of its square, over its square (jitter.py);
+    standard deviation of the readings' instants, `jitter_doubt` that of its square, over its square (encoders.py);
     `pwm_steps` those of the board, if the logs' own duties were finer; `causes` are columns that structure.py fills; `say` takes
     what is done in words, `check` is called often, and may raise to stop."""
     form: Form
@@ -245,7 +244,7 @@ class Fit:
         n = max(float(np.sum(weights)), 1.0)
         expected, sd = 1.0, (SQUARE_NORMAL if problem.jitter_s else SQUARE_EVEN) / np.sqrt(n)
         for share, wheel in zip(weights / n, WHEELS):
-            if slots := problem.slots.get(wheel):  # slots.py: weights and variances
+            if slots := problem.slots.get(wheel):  # encoders.py: weights and variances
                 expected -= share * slots.error_counts**2
                 sd = np.hypot(sd, 2.0 * share * slots.sd_counts)
         sd = np.hypot(sd, 0.5 * problem.jitter_doubt)  # of each two readings, one says what the jitter is
