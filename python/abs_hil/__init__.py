@@ -8,8 +8,6 @@
 The laws, the plant and the cycle are the program's own C++ (abs_hil._core): nothing is written twice. Wrong input raises
 ValueError with the program's text. The messages of a running experiment (`decode`, `TYPES`) need only Python.
 """
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

@@ -112,10 +112,9 @@ def _cells(corner: str, columns: Sequence[Column], cell: Callable[[Column, str, 
     return cells
 
 
-def _aligned(cells: Cells) -> str:
+def aligned(cells: Cells, indent: str = '  ', gap: str = '   ') -> str:
     first, *widths = (max(map(len, column)) for column in zip(*cells))
-    return ''.join(f'  {row[0]:<{first}}' + ''.join(f'   {text:>{width}}' for text, width in zip(row[1:], widths)) + '\n'
-                   for row in cells)
+    return ''.join(indent + gap.join([row[0].ljust(first), *map(str.rjust, row[1:], widths)]).rstrip() + '\n' for row in cells)
 
 
 def in_markdown(cells: Cells) -> str:
@@ -210,7 +209,7 @@ def texts_of(facts: dict[str, Any], names: Sequence[str], rows: Sequence[Sequenc
     brake, first = facts['config']['experiment'], columns[0].runs
     facts.update(plant=first['plant'][0], experiment=first['experiment'][0], start_speed_rad_s=brake['start_speed_rad_s'],
                  end_speed_m_s=brake['end_speed_m_s'], slip_ref=facts['config']['control']['slip_ref'])
-    return {'text': _page(facts, columns, _aligned, '\nDifferences, paired by plant:\n'),
+    return {'text': _page(facts, columns, aligned, '\nDifferences, paired by plant:\n'),
             'markdown': _page(facts, columns, in_markdown, '\n'), 'csv': _table_csv(columns), 'runs': _runs_csv(columns),
             'json': _json(facts, columns)}
 

@@ -63,8 +63,7 @@ def info_of(name: str) -> dict[str, Any]:
             if not told['channels']:
                 raise
             told['runs'].append({'name': one, 'rows': 0, 'notes': [str(error)]})
-    spans = [one['span_ns'] for one in (told['channels'] or told['runs']) if 'span_ns' in one]
-    if spans:
+    if spans := [one['span_ns'] for one in (told['channels'] or told['runs']) if 'span_ns' in one]:
         begin, end = min(begin for begin, _ in spans), max(end for _, end in spans)
         told.update(start_utc=_date(begin), duration_s=(end - begin) * 1e-9)
     return told

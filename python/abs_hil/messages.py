@@ -76,8 +76,7 @@ def messages_of(run: Any) -> Iterator[tuple[int, str, bytes]]:
 
 def decode(data: bytes) -> Any:
     """Decodes the message in `data` of any type. Raises ValueError if it is damaged or not from abs_hil."""
-    type_ = _BY_FINGERPRINT.get(bytes(data[:8]))
-    if type_ is None:
+    if (type_ := _BY_FINGERPRINT.get(bytes(data[:8]))) is None:
         raise ValueError(f'not a message of abs_hil: fingerprint {bytes(data[:8]).hex()}, known are '
                          + ', '.join(f'{name} {t._get_packed_fingerprint().hex()}' for name, t in TYPES.items()))
     try:
@@ -106,8 +105,7 @@ def live(url: str = '', *, channel: str = 'TELEMETRY', prefix: str = 'ABS_', tim
 
 def _messages(subscription: Any, timeout_s: float | None) -> Iterator[Any]:
     while True:
-        received = subscription.next(1.0 if timeout_s is None else timeout_s)
-        if received is not None:
+        if (received := subscription.next(1.0 if timeout_s is None else timeout_s)) is not None:
             with contextlib.suppress(ValueError):
                 yield decode(received[1])
         elif timeout_s is not None:

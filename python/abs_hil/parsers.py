@@ -114,8 +114,7 @@ def report(made: argparse.ArgumentParser) -> None:
     made.add_argument('--table', action='store_true', help='print the figures of merit as a plain table; makes no page')
     made.add_argument('--merits', metavar='FILE', type=to_write('.csv'),
                       help='write the figures of merit as CSV, one row a run, numbers in full')
-    exports = made.add_argument_group('export', 'export rows instead of a page, to --out or stdout')
-    one = exports.add_mutually_exclusive_group()
+    one = made.add_argument_group('export', 'export rows instead of a page, to --out or stdout').add_mutually_exclusive_group()
     for kind, what in zip(EXPORTS, ("all runs in one CSV, with the run's name in the first column", 'runs with summaries, one '
                                     'array per column', 'MAT-file for Octave, MATLAB, SciPy', 'Parquet file')):
         one.add_argument(f'--{kind}', dest='export', action='store_const', const=kind, help=what)

@@ -97,8 +97,7 @@ def _start(name: str, arguments: list[str]) -> int:
     except BrokenPipeError:
         return 0
     except Exception as error:
-        text = misfit(error) or (error if isinstance(error, ImportError) else '')
-        if not text:
+        if not (text := misfit(error) or (error if isinstance(error, ImportError) else '')):
             raise
         print(f'abs_{name}: {text}', file=sys.stderr)
         return 3

@@ -80,15 +80,13 @@ def load(path: PathLike) -> Run:
     the command that mends it, where the package for MCAP (mcap) or Parquet (pyarrow) is missing.
     """
     place, number = named(path)
-    kind = kind_of(place)
-    if kind != FOLDER:
+    if (kind := kind_of(place)) != FOLDER:
         run = {LOG: _load_log, CSV: _load_csv, MCAP: _load_mcap, PARQUET: _load_parquet}[kind](place, os.fspath(path))
         run.folder, run.name = place.parent, f'{place.stem}#{number}' if number else place.stem
         return run
     _core.chosen_run(os.fsencode(path), 1)
     _core.check_seal(os.fsencode(place))
-    rows = next((place / one for one in ('run.csv', 'run.lcmlog') if (place / one).exists()), None)
-    if rows is None:
+    if (rows := next((place / one for one in ('run.csv', 'run.lcmlog') if (place / one).exists()), None)) is None:
         what = 'a series; load it with abs_hil.load_series' if (place / 'series.json').exists() else 'no run folder'
         raise ValueError(f'"{place}" is {what} (it has no run.csv)')
     run = load(rows)

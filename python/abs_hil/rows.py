@@ -171,8 +171,7 @@ def _header(place: pathlib.Path, text: _Text, needed: Sequence[str]) -> tuple[li
     """Names of the columns, and where the rows begin."""
     first = text.data.find(b'\n') + 1
     names = [_core.clean_text(name.strip()) for name in text.data[:first].rstrip(b'\r\n').split(text.separator.encode())]
-    missing = [name for name in needed if name not in names]
-    if missing:
+    if missing := [name for name in needed if name not in names]:
         some = len(missing) < len(needed)
         wrong = f'the header lacks {", ".join(missing)}' if some else 'the first line names no column of a run'
         raise ValueError(f'{place}:1: {wrong}; a run\'s CSV, as abs_hil --csv writes it, begins with "{",".join(CONTRACT[:3])},…"')

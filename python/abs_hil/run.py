@@ -1,6 +1,4 @@
 """A run's rows, summary and signals, from the simulator or from files."""
-from __future__ import annotations
-
 import pathlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -77,7 +75,7 @@ class Run:
     truncated: bool = False
 
     @property
-    def data(self) -> pandas.DataFrame:
+    def data(self) -> 'pandas.DataFrame':
         """The columns as a pandas DataFrame of shape (cycles, columns). `phase` and `phase_name` are categorical. The frame's
         attrs["units"] has the unit of each column that has one."""
         import pandas
@@ -136,7 +134,7 @@ class Series:
         return self.runs[number]
 
     @property
-    def data(self) -> pandas.DataFrame:
+    def data(self) -> 'pandas.DataFrame':
         """One row a run: its name, the figures of the summary and the configuration values that differ."""
         import pandas
         configs = [run.config for run in self.runs]

@@ -1,6 +1,4 @@
 """Runs of the simulated rig in virtual time: one with all its rows, or many with their figures of merit."""
-from __future__ import annotations
-
 import contextlib
 import itertools
 import json
@@ -49,9 +47,8 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
     given = _given(controller, plant, seed, experiment=None if experiment == 'paper' else experiment, model=model, config=config,
                    set=set, inject=inject)
     law = _law_of(controller)
-    varied = None
-    if repetition is not None:
-        varied = (vary, _within('vary_seed', vary_seed, 0, SEED_MAX), _within('repetition', repetition, 0, REPEAT_MAX - 1))
+    varied = None if repetition is None else (vary, _within('vary_seed', vary_seed, 0, SEED_MAX),
+                                              _within('repetition', repetition, 0, REPEAT_MAX - 1))
     return run_of(*_core.simulate(given, law, varied))
 
 
@@ -124,7 +121,7 @@ class Study:
         return len(self.columns['fault'])
 
     @property
-    def data(self) -> pandas.DataFrame:
+    def data(self) -> 'pandas.DataFrame':
         """The columns as a pandas DataFrame, one row a run."""
         import pandas
         return pandas.DataFrame(self.columns)

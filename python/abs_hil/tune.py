@@ -5,7 +5,7 @@ import itertools
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,8 +47,7 @@ class Gain:
 def gains_of(controller: str) -> list[Gain]:
     """The gains that the search sets: the options whose rows give a search range, in their order."""
     section = _core.section_of(controller)
-    return [Gain(row['name'], *row['search']) for row in _core.keys({})
-            if 'search' in row and row['name'].startswith(section)]
+    return [Gain(row['name'], *row['search']) for row in _core.keys({}) if 'search' in row and row['name'].startswith(section)]
 
 
 def tunable() -> list[str]:
@@ -107,27 +106,21 @@ def cost_of(study: Study, follows_slip: bool, locked_m: np.ndarray, obedient_m: 
     return np.where(usable, cost, FAULT_COST)
 
 
-@dataclass
 class Judge:
     """Evaluates candidates: the mean cost over the same cases for each."""
-    controller: str
-    training: Training
-    evaluations: int = 0
-    gains: list[Gain] = field(init=False)
 
-    def __post_init__(self) -> None:
-        if self.controller not in controllers():
-            _core.Controller(options(controller=self.controller))  # says which names there are
-        self.gains = gains_of(self.controller)
+    def __init__(self, controller: str, training: Training) -> None:
+        if controller not in controllers():
+            _core.Controller(options(controller=controller))  # says which names there are
+        self.controller, self.training = controller, training
+        self.evaluations, self.gains = 0, gains_of(controller)
         if not self.gains:
-            raise ValueError(f'controller {self.controller} has no gains to tune; give another controller: '
-                             + ', '.join(tunable()))
-        t = self.training
+            raise ValueError(f'controller {controller} has no gains to tune; give another controller: ' + ', '.join(tunable()))
         self._locked_m = self._distances('locked', {})
         # True speeds and a brake without lag or steps: as near to the wanted slip as any law can come.
         self._obedient_m = self._distances('nominal', {'plant.ideal_sensors': True, 'plant.ideal_actuator': True})
-        torques = [_core.max_brake_torque_Nm(options(plant=plant, model=t.model)) for plant in t.plants]
-        self._max_torque_Nm = np.repeat(torques, t.cases)
+        torques = [_core.max_brake_torque_Nm(options(plant=plant, model=training.model)) for plant in training.plants]
+        self._max_torque_Nm = np.repeat(torques, training.cases)
 
     def _distances(self, controller: str, values: dict[str, float | bool]) -> np.ndarray:
         study = self.training.run([self.training.arguments(plant, controller, values) for plant in self.training.plants])

@@ -75,8 +75,7 @@ def _standing(results: Sequence[Result]) -> Figure:
             curves.append(Curve(0, name, run_style(number), np.array([max(score.variation_median_Nm, 1.0)]),
                                 np.array([max(100.0 * score.excess_mean, 0.1)]), drawn='markers',
                                 marker=_MARKERS[number // STYLES % len(_MARKERS)], legend=name, group=name))
-    label = Label.plain('torque variation in the median, N m')
-    return Figure('standing', 'Distance and what it costs the brake', label,
+    return Figure('standing', 'Distance and what it costs the brake', Label.plain('torque variation in the median, N m'),
                   [Panel(Label.plain('mean excess, %'), curves, height_px=360.0, log=True)],
                   caption='Braking distance over the causal optimum, and the variation of the commanded torque in a stop. '
                           'Lower left is better.')

@@ -105,9 +105,8 @@ def main(given: argparse.Namespace) -> int:
         print(*found[:SHOWN], summary, sep='\n')
         return int(bool(found))
     settings = settings_of(given.set, 'control.KEY=VALUE')
-    for target in (given.json, given.page):
-        if target is not None:
-            write_whole(target, lambda name: None, probe=True)
+    for target in filter(None, (given.json, given.page)):
+        write_whole(target, lambda name: None, probe=True)
     if given.page is not None and given.page.suffix == '.html':
         plotly_js()
     names = [name for text in given.controller for name in text.split(',')]

@@ -71,8 +71,7 @@ def advise(found: Identified) -> list[Advice]:
         total = present + added[np.ix_(free, free)]
         after = np.sqrt(np.diag(np.linalg.inv(total)))
         gain = float(np.linalg.slogdet(total)[1] - np.linalg.slogdet(present)[1])
-        all_of_them.append(Advice(name, gain, {key: float(b / a) for key, a, b in zip(keys, before, after)
-                                               if b / a < NARROWER}))
+        all_of_them.append(Advice(name, gain, {key: float(b / a) for key, a, b in zip(keys, before, after) if b / a < NARROWER}))
     return sorted(all_of_them, key=lambda one: -one.gain)
 
 

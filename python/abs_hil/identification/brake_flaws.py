@@ -42,9 +42,7 @@ def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
 def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
     """(7) at each row, N m; the mean over a row in which the duty changes."""
     now = _static(log.brake_pwm, values)
-    if log.brake_before is None:
-        return now
-    return now + log.late_s / log.period_s * (_static(log.brake_before, values) - now)
+    return now if log.brake_before is None else now + log.late_s / log.period_s * (_static(log.brake_before, values) - now)
 
 
 def _static(duty: np.ndarray, values: Mapping[str, float]) -> np.ndarray:

@@ -39,8 +39,7 @@ def better_form(fits: Sequence[Fit], start_form: str, notes: list[str]) -> tuple
         now = levels if len(left) == 1 else levels[:1]
         levels = levels[len(now):]
         tried = sorted(((_lowered(fit, now), fit) for _, fit in left), key=lambda one: one[0])
-        left = [one for one in tried if one[1].may_follow]
-        if not left:
+        if not (left := [one for one in tried if one[1].may_follow]):
             left = tried
             break
         waiting += [fit for _, fit in tried if not fit.may_follow]

@@ -89,8 +89,7 @@ def search_u0(fit: Fit, width: float, most: int) -> list[tuple[float, float, flo
     if width == 0.0:
         first, last = first - most // 2, last + most // 2
     edges = duties[max(first, 0):last + 1]
-    gaps = list(zip(edges[:-1], edges[1:]))
-    if not gaps:
+    if not (gaps := list(zip(edges[:-1], edges[1:]))):
         return []
     if len(gaps) > most:  # evenly chosen ones; a later call looks closer
         own = min(max(int(np.searchsorted(edges, fit.values['u0'])) - 1, 0), len(gaps) - 1)

@@ -190,8 +190,7 @@ def step(fit: Fit, disturbances: Disturbances) -> float:
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
-    found = linearise_where_better(fit)
-    if found is None or disturbances is not fit.disturbances:
+    if (found := linearise_where_better(fit)) is None or disturbances is not fit.disturbances:
         _, found = run_filter(fit, disturbances)
     fit.disturbances = disturbances
     N, n = keep_normals(fit, found)
@@ -229,8 +228,7 @@ def to_rest(fit: Fit, disturbances: Disturbances, most: int, rests: float = CONV
 def linearise_where_better(fit: Fit) -> list[Any] | None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
     Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
-    last = fit.moved
-    if last is None:
+    if (last := fit.moved) is None:
         fit.scale, fit.halvings = linearise(fit.problem, fit.values, fit.pieces), 0
         return None
     found: list[Any] = []

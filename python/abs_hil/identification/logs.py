@@ -103,11 +103,9 @@ def load_log(path: PathLike | Run) -> Log:
 
 
 def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], content: bytes, experiment: str) -> Log:
-    missing = [name for name in NEEDED if name not in columns]
-    if missing:
+    if missing := [name for name in NEEDED if name not in columns]:
         raise ValueError(f'the log lacks the columns {", ".join(missing)}; needed are {", ".join(NEEDED)}')
-    rows = len(columns['time_s'])
-    if rows < LEAST_ROWS:
+    if (rows := len(columns['time_s'])) < LEAST_ROWS:
         raise ValueError(f'the log has {rows} rows; give at least {LEAST_ROWS}')
     numbers = {'wheels_apart': np.zeros(rows), 'sample_valid': np.ones(rows)}
     for name in ('sample_valid', *HOLDS):

@@ -70,8 +70,7 @@ def _correlations(found: Identified) -> Table:
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sd, sd)
     names = [fit.keys[i] for i in chosen]
-    rows = [[name, *(f'{correlation[i, j]:+.2f}' if j < i else '' for j in range(len(names)))]
-            for i, name in enumerate(names)]
+    rows = [[name, *(f'{correlation[i, j]:+.2f}' if j < i else '' for j in range(len(names)))] for i, name in enumerate(names)]
     return Table('correlations', ['', *names], rows)
 
 

@@ -136,8 +136,7 @@ def base_options(form: Form, start: PathLike) -> Any:
     given.update({f'plant.{wheel}_encoder_{flaw}': 0 for wheel in WHEELS
                   for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts', 'lost_counts')})
     given.update({f'plant.{key}': 0.0 for key in ('brake_overshoot', 'brake_ripple_Nm', 'brake_release_lead_s')})
-    given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing',
-                                                           'lower_bearing')})
+    given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing', 'lower_bearing')})
     return _core.PlantOptions(options(plant=start, set=given))
 
 

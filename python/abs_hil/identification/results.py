@@ -103,8 +103,7 @@ def _believed(found: Identified) -> list[str]:
     lines = []
     if found.fit.problem.form is not FORMS['magic-formula']:
         lines.append("# What controllers believe of the tyre: the magic formula nearest to the plant's force in braking.")
-        tyre = equivalent_tyre(found.fit.problem.base, found.values())
-        lines += [f'{key} = {_number(value)}' for key, value in tyre.items()]
+        lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found.fit.problem.base, found.values()).items()]
     for wheel in WHEELS:
         phase = found.parameters.get(f'{wheel}_encoder_phase_rad')
         if phase is not None and phase.status != 'identified':

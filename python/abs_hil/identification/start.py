@@ -243,8 +243,7 @@ def _tyre(value: dict[str, float], pieces: _Pieces, problem: Problem, unrolled: 
     """Fits the tyre's parameters to the mean force of each interval, as the lower wheel felt it; the upper wheel's radius, too,
     if the wheels never rolled freely: it shifts every slip."""
     form, base, r2, J2 = problem.form, problem.base, problem.given['r2_m'], problem.given['J2_kg_m2']
-    tyre = [p for p in form.parameters
-            if p.acts == 'contact' and (unrolled or p.key != 'r1_m') and p.key not in problem.fixed]
+    tyre = [p for p in form.parameters if p.acts == 'contact' and (unrolled or p.key != 'r1_m') and p.key not in problem.fixed]
     contact = ~pieces.apart
     if not tyre or contact.sum() < 10:
         return

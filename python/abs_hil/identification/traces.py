@@ -127,8 +127,7 @@ def _duties(columns: Mapping[str, np.ndarray], time_s: np.ndarray, trace: Trace)
         if not np.isfinite(begins):
             raise ValueError('brake_duty needs to know when it began; give --reading brake_from_s=TIME')
         return np.array([begins]), np.array([keys['brake_duty']]), np.zeros(1)
-    slip = next((one for one in trace.channels if one.kind == 'slip'), None)
-    if slip is None:
+    if (slip := next((one for one in trace.channels if one.kind == 'slip'), None)) is None:
         raise ValueError('relay_below needs the slip as it was read; give a column slip')
     brakes = (slip.value < keys['relay_below']) & (slip.time_s >= begins - 1e-9)
     return slip.time_s, brakes.astype(float), np.interp(slip.time_s, time_s, motor)

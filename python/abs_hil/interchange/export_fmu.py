@@ -74,10 +74,9 @@ def _add_variables(root: Element, variables: list[dict[str, Any]], fmi: int) -> 
         tag = TYPES[v['type']][fmi - 2]
         allowed = [name for name in v['allowed'] if name != 'python']  # controllers that only this package has
         meaning = v['meaning'] + (': one of ' + ', '.join(allowed) if allowed else '')
-        parameter = v['causality'] == 'parameter'
         node = _add(rows, tag if fmi == 3 else 'ScalarVariable', name=v['name'], valueReference=reference, description=meaning,
                     causality=v['causality'],
-                    variability='tunable' if v['tunable'] else 'fixed' if parameter else
+                    variability='tunable' if v['tunable'] else 'fixed' if v['causality'] == 'parameter' else
                     'continuous' if v['type'] == 'real' else 'discrete')
         if fmi == 2 and v['causality'] == 'output':
             node.set('initial', 'calculated')

@@ -39,8 +39,7 @@ ATTACHED = ('config.toml', 'experiment.toml', 'summary.json', 'environment.json'
 
 def comment(name: str) -> str:
     """Unit and meaning of a quantity."""
-    row = QUANTITIES.get(name)
-    if row is None:
+    if (row := QUANTITIES.get(name)) is None:
         return 'the experiment\'s own name of the phase' if name == 'phase_name' else 'signal of the controller\'s own'
     return f'[{row["unit"]}] {row["meaning"]}' if row['unit'] else str(row['meaning'])
 

@@ -25,20 +25,16 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
     """(channel without prefix, message or None if damaged) as they come. Ends after `idle_s` without a message once one
     has come, after `seconds`, or by an interrupt."""
     subscription = load_network('abs_hil convert --live').Subscription(url, re.escape(prefix) + '.*')
-    begin = time.monotonic()
-    heard = None
-    while seconds is None or time.monotonic() < begin + seconds:
-        packet = subscription.next(0.2)
-        now = time.monotonic()
-        if packet is None:
-            if idle_s is not None and heard is not None and now > heard + idle_s:
-                return
-            continue
-        heard = now
-        try:
-            yield packet[0][len(prefix):], decode(packet[1])
-        except ValueError:
-            yield packet[0][len(prefix):], None
+    end, heard = time.monotonic() + (math.inf if seconds is None else seconds), math.inf
+    while time.monotonic() < end:
+        if (packet := subscription.next(0.2)) is not None:
+            heard = time.monotonic()
+            try:
+                yield packet[0][len(prefix):], decode(packet[1])
+            except ValueError:
+                yield packet[0][len(prefix):], None
+        elif idle_s is not None and time.monotonic() > heard + idle_s:
+            return
 
 
 class Translator:
@@ -52,8 +48,7 @@ class Translator:
         self._cycle = -1
 
     def translate(self, message: Any) -> None:
-        handler = getattr(self, f'_{type(message).__name__}', None)
-        if handler is not None:
+        if (handler := getattr(self, f'_{type(message).__name__}', None)) is not None:
             handler(message)
 
     def _time_ns(self, stamp_ns: int) -> int:
@@ -112,9 +107,7 @@ class Recorder(Translator):
             return
         kind = type(message).__name__
         if hasattr(message, 'sequence') and kind != 'command_state_t':
-            before = self._sequence.get(channel)
-            if before is not None and message.sequence > before + 1:
-                self.lost += message.sequence - before - 1
+            self.lost += max(message.sequence - self._sequence.get(channel, message.sequence) - 1, 0)
             self._sequence[channel] = message.sequence
         self.rows += kind == 'telemetry_t'
         if kind == 'experiment_t':

@@ -46,8 +46,7 @@ class Task:
     def cycles(self) -> int:
         """Control periods of an action."""
         rate_Hz = float(self.set.get('control.rate_Hz', 1000.0))
-        cycles = round(self.period_s * rate_Hz)
-        if cycles < 1:
+        if (cycles := round(self.period_s * rate_Hz)) < 1:
             raise ValueError(f'period_s {self.period_s}: give at least one control period, {1.0 / rate_Hz} s')
         return cycles
 

@@ -89,8 +89,7 @@ def causal(rig: Rig, start: np.ndarray, road: Sequence[Piece], end_speed_m_s: fl
     x, now_s, number = np.asarray(start, dtype=float), 0.0, 0
     while True:
         piece = road[number]
-        present = float(piece.friction(now_s, x[DISTANCE]))
-        plan = solve(rig, x, now_s, [Piece(present)], end_speed_m_s)
+        plan = solve(rig, x, now_s, [Piece(float(piece.friction(now_s, x[DISTANCE])))], end_speed_m_s)
         part, stops = _cut(rig, plan, piece, math.inf if piece.slope == 0.0 else now_s + REPLAN_S)
         driven = part if driven is None else driven.then(part)
         if stops:

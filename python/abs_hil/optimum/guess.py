@@ -117,8 +117,7 @@ class Guesser:
                 phase.time_s.append(now_s)
                 phase.states.append(x)
                 phase.commands_Nm.append(float(command))
-                stands = self._holds(x, friction)
-                if stands != phase.stands:
+                if (stands := self._holds(x, friction)) != phase.stands:
                     found.append(phase)
                     phase = Phase(piece, stands, False, [now_s], [x])
             if len(phase.time_s) < 2:  # nothing happened since the last change

@@ -40,18 +40,16 @@ class Rig:
     @property
     def max_torque_Nm(self) -> float:
         """The largest static torque of the brake, b(1), or that of the largest duty."""
-        if self.brake_duty_max < self['u0']:
-            return 0.0
-        return max(0.0, self['b1_Nm'] * self.brake_duty_max + self['b2_Nm'])
+        return 0.0 if self.brake_duty_max < self['u0'] else max(0.0, self['b1_Nm'] * self.brake_duty_max + self['b2_Nm'])
 
     @property
     def rate_limit_Nm_s(self) -> float:
         """The fastest change of the brake torque; infinite without a limit."""
         return self['brake_rate_limit_Nm_s'] or math.inf
 
-    def state(self, omega1_rad_s: float, omega2_rad_s: float, torque_Nm: float = 0.0, distance_m: float = 0.0) -> np.ndarray:
-        slip = 1.0 - self['r1_m'] * omega1_rad_s / (self['r2_m'] * omega2_rad_s)
-        return np.array([slip, omega2_rad_s, torque_Nm, distance_m])
+    def state(self, omega1_rad_s: float, omega2_rad_s: float) -> np.ndarray:
+        """Where a braking begins: without a torque."""
+        return np.array([1.0 - self['r1_m'] * omega1_rad_s / (self['r2_m'] * omega2_rad_s), omega2_rad_s, 0.0, 0.0])
 
     def omega1_rad_s(self, x: Any) -> Any:
         return (1.0 - x[SLIP]) * x[OMEGA2] * self['r2_m'] / self['r1_m']
@@ -161,8 +159,7 @@ class Piece:
 
 def road_of(rig: Rig) -> list[Piece]:
     """The pieces of the plant's friction profile. Braking begins at once, so both origins of a profile are the same."""
-    text = str(rig.values['friction_profile'])
-    if not text:
+    if not (text := str(rig.values['friction_profile'])):
         return [Piece(1.0)]
     axis, _, parts = _core.profile_of(text, 'plant.friction_profile')
     ends = [begin for begin, _, _ in parts[1:]] + [math.inf]

@@ -191,8 +191,7 @@ def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase],
                    lbg=np.concatenate([np.zeros(zeros.numel() + len(within)), np.full(len(lasting), SHORTEST_S)]),
                    ubg=np.concatenate([np.zeros(zeros.numel()), np.full(len(within), rig.max_torque_Nm),
                                        np.full(len(lasting), np.inf)]))
-    status = solver.stats()['return_status']
-    if status not in ('Solve_Succeeded', 'Solved_To_Acceptable_Level'):
+    if (status := solver.stats()['return_status']) not in ('Solve_Succeeded', 'Solved_To_Acceptable_Level'):
         raise NoOptimum(f'no optimal braking: IPOPT says {status}')
     values = ca.Function('values', [w], [ca.vertcat(*times), ca.horzcat(*states), ca.vertcat(*commands)])(found['x'])
     return Trajectory(values[0].full().ravel(), values[1].full().T * SCALE, values[2].full().ravel())

@@ -1,4 +1,6 @@
-"""The figures of runs over time: the time histories, the counterparts of the paper's figures 5 to 10, the signals."""
+"""The figures of runs over time: the time histories, the counterparts of the paper's figures 5 to 10, the signals; and the
+histograms of the cycle's timing."""
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -6,9 +8,9 @@ from typing import Any, Union
 
 import numpy as np
 
-from ..run import Run
-from .files import RunFiles
-from .model import Bar, Curve, Figure, Label, Mark, Panel, Shade, Style, axis_around, phase_colour, run_style, thinned
+from ..run import Run, stretches
+from .files import PARTS, RunFiles
+from .model import STYLES, Bar, Curve, Figure, Label, Mark, Panel, Shade, Style, axis_around, phase_colour, run_style, thinned
 from .survey import JUDGED_M_S, Survey, survey
 from .text import short_names
 
@@ -25,6 +27,7 @@ MOST_BARS = 60  # of a run; more would be unreadable
 DOUBLE_PX = 165.0
 MOST_DRAWN = 1e30  # axes are drawn in single precision
 PX_A_MARK = 34.0
+BINS_A_DECADE = 10.0  # of histograms
 REFERENCE, SECOND = Style('#000000', (2, 3), 1.1), Style('#D55E00', (7, 4), 1.3)
 TIME = Label('time since the start of the run, <i>t</i> / s', 'time since the start of the run, $t$ / s')
 #: which part of the runs the figures show: 'brake', braking with a margin; 'run', all; or seconds of the run
@@ -159,8 +162,7 @@ class FigureMaker:
         del self.marks[MOST_MARKS:]
 
     def _begin(self, id_: str, heading: str, caption: str, panels: list[Panel], paper: int = 0) -> Figure:
-        return Figure(id_, heading, self.x_label, panels, caption.strip(), self.x_range, self.axis, self.shades, self.marks,
-                      paper)
+        return Figure(id_, heading, self.x_label, panels, caption.strip(), self.x_range, self.axis, self.shades, self.marks, paper)
 
     def _add(self, panel: Panel, run: int, quantity: str, style: Style, legend: str = '', group: str = '',
              title: str = '') -> None:
@@ -326,7 +328,7 @@ def run_figures(runs: list[RunFiles], options: Options,
     """The surveys and figures of all runs. Each CSV is read once, and again only if some runs do not brake."""
     surveys, windows, profiles = [], [], []
     shown = False
-    stretches = min(max(STRETCHES_OF_ALL_RUNS // max(len(runs), 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
+    most_stretches = min(max(STRETCHES_OF_ALL_RUNS // max(len(runs), 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
     for number, run in enumerate(runs, 1):
         rows = run.rows()
         found = survey(run, rows)
@@ -334,7 +336,7 @@ def run_figures(runs: list[RunFiles], options: Options,
         windows.append(window_of(found, options.choice, found.brakes))
         time_s = rows.columns['time_s']
         shown |= bool(((time_s >= windows[-1].from_s) & (time_s <= windows[-1].to_s)).any())
-        profiles.append(profiles_of(rows, found, windows[-1], stretches))
+        profiles.append(profiles_of(rows, found, windows[-1], most_stretches))
         if progress is not None:
             progress(number, len(runs))
     if not shown:
@@ -345,5 +347,52 @@ def run_figures(runs: list[RunFiles], options: Options,
         for number, found in enumerate(surveys):
             if found.brakes:
                 windows[number] = window_of(found, options.choice, False)
-                profiles[number] = profiles_of(runs[number].rows(), found, windows[number], stretches)
+                profiles[number] = profiles_of(runs[number].rows(), found, windows[number], most_stretches)
     return surveys, FigureMaker(runs, surveys, windows, profiles, options, braking).figures()
+
+
+def _edges(last_us: int) -> np.ndarray:
+    """Lower edges, in whole us, of bins of about equal width on a logarithmic axis: 0, 1, 2, ..."""
+    bins = math.ceil(BINS_A_DECADE * (math.log10(last_us + 1) + 1.0))
+    edges = np.unique(np.append(0, np.rint(10.0 ** (np.arange(bins) / BINS_A_DECADE)).astype(int)))
+    return edges[:np.searchsorted(edges, last_us, 'right') + 1]
+
+
+def outline(counts: np.ndarray, total: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Share of the cycles by duration as the outline of a bar chart; no outline over empty bins."""
+    edges = _edges(len(counts))
+    ends = np.maximum(edges, 0.5)
+    shares = np.array([counts[first:last].sum() for first, last in zip(edges, edges[1:])]) / total
+    bars = stretches(shares > 0.0)
+    x = [np.append(np.repeat(ends[a:b + 1], 2), ends[b]) for a, b in bars]
+    y = [np.concatenate([[floor], np.repeat(shares[a:b], 2), [floor, math.nan]]) for a, b in bars]
+    return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
+
+
+def timing_figure(runs: list[RunFiles]) -> Figure | None:
+    """None if no run has a histogram."""
+    timed = ((number, run.histogram) for number, run in enumerate(runs) if run.histogram is not None)
+    if not (histograms := dict(itertools.islice(timed, STYLES))):
+        return None
+    columns = [counts for histogram in histograms.values() for counts in histogram.counts]
+    greatest = max([1.0, *(float(counts.sum()) for counts in columns)])
+    last_us = max([10, *(len(counts) for counts in columns)])
+    floor = 10.0 ** math.floor(math.log10(0.9 / greatest))
+    panels = []
+    overflows = 0
+    for part, name in enumerate(PARTS):
+        panel = Panel(Label.plain('share'), y_range=(floor, 1.0), height_px=105.0, log=True)
+        for number, histogram in histograms.items():
+            overflows += histogram.overflows[part]
+            total = float(histogram.counts[part].sum())
+            if total > 0.0:
+                x, y = outline(histogram.counts[part], total, floor)
+                panel.curves.append(Curve(number, name, run_style(number), x, y, legend=runs[number].label, group=f'run {number}'))
+        panels.append(panel)
+    caption = ('Share of the cycles by duration: (a) lateness of the wake-up, (b) reading the board, (c) control, (d) writing, '
+               '(e) the whole cycle. Bins are about a tenth of a decade wide and hold whole microseconds; the first bin holds '
+               'all durations below 1 µs. The axis ends below one cycle.')
+    if overflows > 0:
+        caption += f" {overflows} durations beyond the histograms' range are not shown."
+    return Figure('timing', 'Timing of the control cycle', Label.plain('duration / µs'), panels, caption,
+                  (0.5, 10.0 ** math.ceil(math.log10(last_us))), 'timing')

@@ -46,8 +46,7 @@ def order_for_paper(runs: list[RunFiles], notes: list[str]) -> None:
     if runs[1].text('controller') == 'adaptive' and runs[0].text('controller') != 'adaptive':
         runs.reverse()
     for run, wanted in zip(runs, ('adaptive', 'sliding-mode')):
-        controller = run.text('controller')
-        if controller != wanted:
+        if (controller := run.text('controller')) != wanted:
             notes.append(f'{run.called} is shown as {wanted}, but its controller is {controller or "not known"}')
     if runs[0].text('plant') != runs[1].text('plant'):
         notes.append('the two runs have different plants')

@@ -63,8 +63,7 @@ def _draw_panel(axes: Any, figure: Figure, panel: Panel, labelled: set[str]) -> 
     for bar in panel.bars:
         axes.fill_between([bar.x0, bar.x1], bar.y0, bar.y1, facecolor=bar.colour, edgecolor='#888888', linewidth=0.5)
         if (bar.x1 - bar.x0) / max(high - low, 1e-12) > 0.014 * len(bar.text):
-            axes.text(0.5 * (bar.x0 + bar.x1), 0.5 * (bar.y0 + bar.y1), _plain(bar.text), ha='center', va='center',
-                      fontsize=8)
+            axes.text(0.5 * (bar.x0 + bar.x1), 0.5 * (bar.y0 + bar.y1), _plain(bar.text), ha='center', va='center', fontsize=8)
 
 
 def _mark_names(axes: Any, figure: Figure) -> None:
@@ -88,8 +87,7 @@ def _drawn(figure: Figure) -> Any:
         _draw_panel(axes, figure, panel, labelled)
     _mark_names(every[0], figure)
     every[-1].set_xlabel(figure.x_label.math)
-    handles = [(handle, text) for axes in every for handle, text in zip(*axes.get_legend_handles_labels())]
-    if handles:
+    if handles := [(handle, text) for axes in every for handle, text in zip(*axes.get_legend_handles_labels())]:
         every[0].legend([handle for handle, _ in handles], [text for _, text in handles], loc='lower left', ncols=3,
                         bbox_to_anchor=(0.0, 1.08 if figure.marks else 1.0), fontsize=8, frameon=False)
     return picture

@@ -37,8 +37,7 @@ def packed(plots: list[dict[str, Any]]) -> bytes:
     known: dict[tuple[str, bytes], int] = {}
 
     def reference(array: np.ndarray) -> dict[str, Any]:
-        key = (array.dtype.str, array.tobytes())
-        if key not in known:
+        if (key := (array.dtype.str, array.tobytes())) not in known:
             known[key] = len(floats)
             floats.extend(key[1])
         return {'floats': 8 * array.dtype.itemsize, 'at': known[key], 'size': array.size,

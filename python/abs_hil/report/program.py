@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .. import parsers
+from ..compare import aligned
 from ..core import _core
 from ..files import refuse_existing, write_text, write_whole
 from ..options import failed
@@ -17,7 +18,7 @@ from ..places import misfit
 from ..simulation import progress_shown
 from . import paper, pictures, tables
 from .export import Exporter
-from .figures import Choice, Options, run_figures
+from .figures import Choice, Options, run_figures, timing_figure
 from .files import FoundRuns, RunFiles, find_runs
 from .model import STYLES, Figure
 from .page import PAGE_MARK, page
@@ -25,7 +26,6 @@ from .series import SeriesStudy, group_table, series_figure, series_table, study
 from .survey import Survey
 from .tables import Table, merits
 from .text import clean
-from .timing import timing_figure
 
 MOST_NOTES = 10
 _MARK_BYTES = 4096
@@ -136,11 +136,8 @@ def _export(o: argparse.Namespace, columns: list[str]) -> None:
     _say(exporter.notes)
 
 
-def _print_rows(table: Table) -> None:
-    lines = [table.header, *table.rows]
-    widths = [max(map(len, column)) for column in zip(*lines)]
-    for first, *rest in lines:
-        print('  '.join([first.ljust(widths[0]), *map(str.rjust, rest, widths[1:])]).rstrip())
+def _plain(table: Table) -> str:
+    return aligned([table.header, *table.rows], '', '  ')
 
 
 def _report(o: argparse.Namespace) -> None:
@@ -155,10 +152,7 @@ def _report(o: argparse.Namespace) -> None:
     if o.merits:
         write_whole(o.merits, lambda name: merits(runs, surveys).to_csv(name, index=False, na_rep='NaN'))
     if o.table:
-        for part in parts['series']:
-            _print_rows(part['groups'])
-            print()
-        _print_rows(parts['metrics'])
+        print(*(_plain(table) for table in (*(part['groups'] for part in parts['series']), parts['metrics'])), sep='\n', end='')
     else:
         write_text(path, page(**parts))
     _say(parts['notes'])
@@ -172,7 +166,7 @@ def _report_study(o: argparse.Namespace) -> None:
     from ..studies import page as of_study
     results = of_study.results_of(o)
     if o.table:
-        _print_rows(of_study.quantile_table(results))
+        print(_plain(of_study.quantile_table(results)), end='')
         return
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:

@@ -43,8 +43,7 @@ def study(name: str, numbers: list[int], runs: list[RunFiles]) -> SeriesStudy:
     found = SeriesStudy(name, [key for key in differing_keys([runs[number] for number in numbers]) if key != 'run.seed'])
     known: dict[tuple[str, ...], Group] = {}
     for number in numbers:
-        values = tuple(runs[number].config.get(key, DASH) for key in found.keys)
-        if values not in known:
+        if (values := tuple(runs[number].config.get(key, DASH) for key in found.keys)) not in known:
             parts = [f'{key.rpartition(".")[2]} = {value}' for key, value in zip(found.keys, values)][:MOST_KEYS_IN_LABEL]
             label = ', '.join(parts + (['…'] if len(found.keys) > MOST_KEYS_IN_LABEL else []))
             known[values] = Group(clean(label, LABEL_CHARACTERS) if label else 'all runs', [],

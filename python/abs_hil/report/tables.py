@@ -73,9 +73,8 @@ def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, s
         values = [value_of(metric, run, found) for run, found in zip(runs, surveys)]
         if not any(math.isfinite(value) for value in values):
             continue
-        comparable = pair and metric.better == 'less'
         add(metric.heading, [shown(value, metric.decimals) for value in values],
-            _change(values[0], values[1]) if comparable else '')
+            _change(values[0], values[1]) if pair and metric.better == 'less' else '')
     add('rows in the CSV', [str(found.rows) for found in surveys])
     add('run', [run.name for run in runs])
     return table.arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''

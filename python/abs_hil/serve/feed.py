@@ -119,28 +119,25 @@ class Feed:
         rows = np.array(self._rows, dtype=np.float64)
         names, self._phase_names = self._phase_names, []
         self._rows.clear()
-        self._add_force(rows)
+        self._add_force(self._run, rows)
         self._run.take_rows(rows, names)
         self.history.add(self._run.number, rows)
         for listener in list(self.listeners):
             listener(self._run, rows)
 
-    def _add_force(self, rows: np.ndarray) -> None:
+    def _add_force(self, run: RunFacts, rows: np.ndarray) -> None:
         """A point for each bin of these rows: that of the window that ends with the bin's last row."""
-        assert self._run is not None
         if (rows[:, PLACE['phase']] != BRAKE).all():
             return
         cycles = self.history.cycles
         before = cycles.places(cycles.head - MOST_IN_WINDOW, cycles.head)
-        known = np.concatenate((cycles.values[before[cycles.run[before] == self._run.number]], rows))
+        known = np.concatenate((cycles.values[before[cycles.run[before] == run.number]], rows))
         time_s = known[:, PLACE['time_s']]
-        numbers = self.history.bin_numbers(time_s)
-        for last in np.flatnonzero(np.diff(numbers, append=-1)).tolist():
+        for last in np.flatnonzero(np.diff(self.history.bin_numbers(time_s), append=-1)).tolist():
             if last < len(known) - len(rows):
                 continue
             first = int(np.searchsorted(time_s, time_s[last] - 2 * HALF_WINDOW_S))
-            found = force_point(known[first:last + 1], self._run.config)
-            if found is not None:
+            if (found := force_point(known[first:last + 1], run.config)) is not None:
                 rows[last - len(known), DERIVED_PLACE:] = found
 
 
@@ -167,8 +164,7 @@ def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float]
         return None
     _, first, second, _ = np.linalg.lstsq(np.vander(scaled, 4, increasing=True), angles, rcond=None)[0]
     omega, alpha = first / HALF_WINDOW_S, 2 * second / HALF_WINDOW_S ** 2
-    v_x_m_s = r2_m * omega[1]
-    if v_x_m_s < SLOW_M_S:
+    if (v_x_m_s := r2_m * omega[1]) < SLOW_M_S:
         return None
     return 1 - r1_m * omega[0] / v_x_m_s, -(J2_kg_m2 * alpha[1] + d2_Nms_rad * omega[1] + M20_Nm) / r2_m
 

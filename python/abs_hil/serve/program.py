@@ -1,9 +1,11 @@
 """The command line of abs_serve; `abs_hil serve` starts it."""
 import argparse
 import asyncio
+import contextlib
 import re
 import secrets
 import signal
+from functools import partial
 from typing import Any
 
 from .. import parsers
@@ -12,7 +14,7 @@ from ..files import refusal
 from ..options import as_main
 from .feed import Feed, Played
 from .runs import BIN_S, History
-from .server import Command, Server, is_loopback
+from .server import Server, is_loopback
 
 COMMANDS = ('stop', 'start', 'continue', 'slip-ref', 'gain')
 ANSWER_S = 3.0
@@ -45,17 +47,15 @@ def _source(given: argparse.Namespace) -> Any:
     return Played(given.log, given.speed, given.prefix)
 
 
-def _sender(given: Any) -> Command:
-    async def send(command: str, name: str, value: float) -> tuple[bool, str]:
-        if command not in COMMANDS:
-            return False, f'"{command}" is no command: give one of {" ".join(COMMANDS)}'
-        try:
-            return await asyncio.get_running_loop().run_in_executor(
-                None, load_network('a command').send_command, command, name, value, given.lcm_url, given.prefix,
-                given.commands, ANSWER_S)
-        except (OSError, ValueError) as error:
-            return False, str(error)
-    return send
+async def _send(given: Any, command: str, name: str, value: float) -> tuple[bool, str]:
+    if command not in COMMANDS:
+        return False, f'"{command}" is no command: give one of {" ".join(COMMANDS)}'
+    try:
+        return await asyncio.get_running_loop().run_in_executor(
+            None, load_network('a command').send_command, command, name, value, given.lcm_url, given.prefix, given.commands,
+            ANSWER_S)
+    except (OSError, ValueError) as error:
+        return False, str(error)
 
 
 async def _serve(given: Any, source: Any) -> int:
@@ -64,7 +64,7 @@ async def _serve(given: Any, source: Any) -> int:
     # Another user of this computer could connect to its own address too, so commands always need the token.
     token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
     shown = given.log or given.lcm_url or 'LCM'
-    server = Server(feed, given.host, given.port, token, shown, _sender(given) if given.commands is not None else None)
+    server = Server(feed, given.host, given.port, token, shown, partial(_send, given) if given.commands is not None else None)
     foxglove = None
     if given.foxglove is not None:
         from ..interchange.running import Foxglove
@@ -78,18 +78,14 @@ async def _serve(given: Any, source: Any) -> int:
     print(f'abs_hil serve: {server.link}', flush=True)
     if foxglove is not None:
         print(f'abs_hil serve: for Foxglove, Lichtblick, PlotJuggler: {foxglove.link}', flush=True)
-    end: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-
-    def finish(number: int) -> None:
-        if not end.done():
-            end.set_result(number)
+    signals = asyncio.Queue[int]()
     for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, finish, int(number))
+        asyncio.get_running_loop().add_signal_handler(number, signals.put_nowait, int(number))
     try:
-        while not end.done():
+        while True:
             feed.take(source.waiting())
-            await asyncio.wait((end,), timeout=BIN_S)
-        return end.result()
+            with contextlib.suppress(TimeoutError):
+                return await asyncio.wait_for(signals.get(), BIN_S)
     finally:
         await server.stop()
         if foxglove is not None:

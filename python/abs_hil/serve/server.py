@@ -117,8 +117,7 @@ class Server:
             return await self._view(request)
         if path.startswith('/download.'):
             return await self._send_file(request, path.removeprefix('/download.'))
-        name = path[1:] or 'index.html'
-        if name not in self._files:
+        if (name := path[1:] or 'index.html') not in self._files:
             return refused(404, 'no such page')
         kind = KINDS[pathlib.PurePath(name).suffix]
         return web.Response(body=self._files[name], content_type=kind, charset='utf-8', headers=HEADERS)
@@ -127,10 +126,8 @@ class Server:
         """Why this request is refused; empty: it is not."""
         if request.method != 'GET':
             return 'only GET is answered'
-        if self.token:
-            given = request.path.split('/')[1]
-            if not hmac.compare_digest(given.encode(), self.token.encode()):
-                return 'the token in the link is wrong or missing; use the whole link that abs_hil serve printed'
+        if self.token and not hmac.compare_digest(request.path.split('/')[1].encode(), self.token.encode()):
+            return 'the token in the link is wrong or missing; use the whole link that abs_hil serve printed'
         host = request.headers.get('Host', '')
         # A foreign name that leads here is an attack by DNS. With a token the name does not matter.
         if not self.token and not is_loopback(urlsplit(f'//{host}').hostname or ''):
@@ -168,8 +165,7 @@ class Server:
             return refused(503, 'other downloads are under way')
         try:
             asked = {name: parse_json(value) for name, value in request.query.items()}
-            run = self.feed.runs.get(whole(asked, 'run'))
-            if run is None:
+            if (run := self.feed.runs.get(whole(asked, 'run'))) is None:
                 raise Bad('this run is no longer kept')
             rows = self.feed.history.rows_of(run.number, real(asked, 'from_s'), real(asked, 'to_s'), 1 << 30)
             if len(rows) == 0:

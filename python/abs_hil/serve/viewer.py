@@ -65,8 +65,7 @@ class Trigger:
 
     def look(self, run: RunFacts, rows: np.ndarray) -> dict[str, Any] | None:
         """What a viewer is told of the first cycle that meets it; None: none of these does."""
-        place = own_place(run.own, self._signal)
-        if place is None:
+        if (place := own_place(run.own, self._signal)) is None:
             return None
         values = rows[:, place]
         before = np.concatenate(([self._before if run.number == self._run else math.nan], values[:-1]))
@@ -159,8 +158,7 @@ class Viewer:
         self._trigger = None if asked.get('on') == 'off' else Trigger(asked)
 
     def _rows(self, asked: dict[str, Any]) -> None:
-        run = self._feed.runs.get(whole(asked, 'run'))
-        if run is None:
+        if (run := self._feed.runs.get(whole(asked, 'run'))) is None:
             raise Bad('this run is no longer kept')
         names = ['time_s', 'cycle', *signals(asked)]
         rows = self._feed.history.rows_of(run.number, real(asked, 'from_s'), real(asked, 'to_s'), MOST_ROWS)

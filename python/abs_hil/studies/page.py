@@ -205,8 +205,7 @@ def distributions(results: StudyResults, metrics: list[str]) -> dict[str, Any] |
             continue
         edges = np.linspace(values.min(), values.max(), int(np.clip(np.sqrt(len(values)), 5, BINS_OF_DISTRIBUTION)) + 1)
         cell = Cell([], heading_of(metric), 'runs')
-        groups = _told_apart(frame, by)
-        for number, (name, part) in enumerate(groups):
+        for number, (name, part) in enumerate(_told_apart(frame, by)):
             counts = np.histogram(part[metric].dropna(), edges)[0]
             cell.traces.append({
                 'x': numbers(np.concatenate([edges[:1], 0.5 * (edges[:-1] + edges[1:]), edges[-1:]])),
@@ -277,20 +276,6 @@ def worst_table(results: StudyResults, metrics: list[str]) -> Table:
     return Table('worst', ['of', 'value', *(title_of(name) for name in names)], rows, False)
 
 
-def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
-    """The page as HTML that needs no network. metrics: whose curves and maps it shows."""
-    sobol, notes = Table('sobol', [], []), list[str]()
-    if results.facts['design'] == 'saltelli':
-        sobol, notes = sobol_table(results, metrics)
-    drawings = [drawing for metric in metrics for drawing in (curves(results, metric), maps(results, metric)) if drawing]
-    if not numeric_factors(results) and (drawing := distributions(results, results.metrics)):
-        drawings.append(drawing)
-    return render('study.html.j2', [drawing['plot'] for drawing in drawings], _FOLDER,
-                  version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
-                  description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
-                  worst=worst_table(results, metrics), reasons=reasons_table(results), drawings=drawings, notes=notes)
-
-
 def results_of(o: argparse.Namespace) -> StudyResults:
     """The one study of the command line. Raises ValueError."""
     if len(o.runs) != 1:
@@ -305,8 +290,18 @@ def results_of(o: argparse.Namespace) -> StudyResults:
 
 
 def page_of(o: argparse.Namespace, results: StudyResults) -> str:
+    """The page as HTML that needs no network. Raises ValueError for a metric that the study lacks."""
     metrics = [name for names in o.metrics for name in names.split(',')] or [name for name in SHOWN if name in results.metrics]
     for name in metrics:
         if name not in results.metrics:
             raise ValueError(f'--metric {name}: the study has {", ".join(results.metrics)}')
-    return page(results, metrics, o.title)
+    sobol, notes = Table('sobol', [], []), list[str]()
+    if results.facts['design'] == 'saltelli':
+        sobol, notes = sobol_table(results, metrics)
+    drawings = [drawing for metric in metrics for drawing in (curves(results, metric), maps(results, metric)) if drawing]
+    if not numeric_factors(results) and (drawing := distributions(results, results.metrics)):
+        drawings.append(drawing)
+    return render('study.html.j2', [drawing['plot'] for drawing in drawings], _FOLDER,
+                  version=_core.version, title=o.title or f'Study {results.facts["study"]}', facts=results.facts,
+                  description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
+                  worst=worst_table(results, metrics), reasons=reasons_table(results), drawings=drawings, notes=notes)

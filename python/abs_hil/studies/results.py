@@ -170,8 +170,7 @@ class StudyResults:
         rows = self.columns(['point', 'plant', 'experiment', 'controller', *self.levels, *(where or {}), metric])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
-        others = [name for name in ('plant', 'experiment', 'controller', *self.levels) if rows[name].nunique() > 1]
-        if others:
+        if others := [name for name in ('plant', 'experiment', 'controller', *self.levels) if rows[name].nunique() > 1]:
             raise ValueError(f'where: give values of {", ".join(others)}')
         values = rows.groupby('point', sort=True)[metric].mean().to_numpy()  # over the repetitions
         if not np.isfinite(values).all():

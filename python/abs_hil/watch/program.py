@@ -36,8 +36,7 @@ class Feed:
 
     def take_until(self, end_s: float) -> None:
         while (left_s := end_s - time.monotonic()) > 0.0:
-            packet = self._subscription.next(left_s)
-            if packet is None:
+            if (packet := self._subscription.next(left_s)) is None:
                 return
             try:
                 message = decode(packet[1])
@@ -72,8 +71,7 @@ def on_terminal(feed: Feed, screen: Screen) -> None:
     console = Console(highlight=False, emoji=False, markup=False)
     with keys(), Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False) as live:
         while True:
-            size = console.size
-            screen = Screen(size.width, size.height, screen.unicode, screen.source, screen.channel)
+            screen = Screen(*console.size, screen.unicode, screen.source, screen.channel)
             live.update(Group(*draw(feed.view, time.monotonic(), screen)), refresh=True)
             feed.take_until(time.monotonic() + DRAW_PERIOD_S)
             while select.select([0], [], [], 0.0)[0]:
@@ -118,12 +116,8 @@ def main(arguments: list[str]) -> int:
         p.error(f"--prefix '{o.prefix}': give at most 48 letters, digits, '_', '-' and '/'")
     locale = os.environ.get('LC_ALL') or os.environ.get('LC_CTYPE') or os.environ.get('LANG') or ''
     unicode = not o.ascii and 'utf' in locale.lower()
-
-    def end(number: int, _frame: object) -> None:
-        sys.exit(ENDING[signal.Signals(number)])
-
-    for number in ENDING:
-        signal.signal(number, end)
+    for number, status in ENDING.items():
+        signal.signal(number, lambda *_, status=status: sys.exit(status))
     try:
         feed = Feed(o.lcm_url, o.prefix, o.window)
     except (ValueError, OSError) as error:

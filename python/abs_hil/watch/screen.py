@@ -62,8 +62,7 @@ def _flow(items: Iterable[tuple[str, str]], screen: Screen) -> list[Text]:
 
 def liveness(view: RunView, now_s: float) -> tuple[str, str]:
     """"1000 messages/s", "no messages for 3.2 s", "waiting for messages", and its style."""
-    silence_s = view.silence_s(now_s)
-    if silence_s is None:
+    if (silence_s := view.silence_s(now_s)) is None:
         return 'waiting for messages', ALARM
     if silence_s < SILENT_AFTER_S:
         return f'{view.messages_last_second(now_s)} messages/s', GOOD
@@ -93,7 +92,6 @@ def one_line(view: RunView, now_s: float, screen: Screen) -> str:
 def draw(view: RunView, now_s: float, screen: Screen) -> list[Text]:
     """The whole picture: at most `rows` lines of at most `columns` characters."""
     head = _head(view, now_s, screen)
-    foot: list[Text] = []
     if view.telemetry is None and view.status is None:
         foot = _waiting(view, screen)
     else:
@@ -103,8 +101,7 @@ def draw(view: RunView, now_s: float, screen: Screen) -> list[Text]:
         state += [(view.fault(), ALARM)] if kind == 'fault' else [(text, '') for text in _values(view)]
         head += _flow(state, screen)
         foot = _foot(view, screen)
-    rows = screen.rows - len(head) - len(foot) - 1
-    middle = _plots(view, rows, screen)
+    middle = _plots(view, screen.rows - len(head) - len(foot) - 1, screen)
     lines = [*head, *middle, *foot[:max(screen.rows - len(head) - len(middle) - 1, 0)]]
     lines = lines + [Text()] * (screen.rows - 1 - len(lines)) + [Text('q quits', DIM)]
     lines = lines[:max(screen.rows, 0)]
@@ -114,10 +111,9 @@ def draw(view: RunView, now_s: float, screen: Screen) -> list[Text]:
 
 
 def _head(view: RunView, now_s: float, screen: Screen) -> list[Text]:
-    title = 'abs_hil watch'
     e = view.experiment
     names = ' · '.join(printable(name) for name in (e.experiment, e.controller, e.plant, e.backend)) if e else ''
-    lines = _flow([(title, BOLD), *([(names, '')] if names else [])], screen)
+    lines = _flow([('abs_hil watch', BOLD), *([(names, '')] if names else [])], screen)
     live, style = liveness(view, now_s)
     room = screen.columns - lines[-1].cell_len - len(live)
     if room < 2:
@@ -139,8 +135,7 @@ def _waiting(view: RunView, screen: Screen) -> list[Text]:
 def _foot(view: RunView, screen: Screen) -> list[Text]:
     """The controller's signals, timing, counts of errors and the latest events."""
     lines = _flow([(f'{name} {number(value, 4)}', '') for name, value in view.signals().items()], screen)
-    s = view.status
-    if s is None:
+    if (s := view.status) is None:
         lines += _flow([('timing: no status received yet', DIM)], screen)
     else:
         def quantiles(name: str) -> str:
