@@ -8,7 +8,7 @@ set(ABS_HIL_ROOM_TABLE
   "cli | options and subcommands of a program as rows, the only source that includes CLI11 | rig"
   "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"
   "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"
-  "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`, `driver/hm2`), injected faults (`driver/injection`) | rig"
+  "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`, `driver/hm2`) | rig"
   "driver_sim | the simulated backend (`driver/sim`) | rig driver plant_sim"
   "runtime | clocks, cyclic executive, command gate with its plausibility checks, rings, histograms, real-time set-up | rig driver"
   "experiment | sequence of phases, the logic of a run, commissioning | files rig control driver runtime"
@@ -22,6 +22,7 @@ set(ABS_HIL_ROOM_TABLE
   "run | one run, put together from its settings in one place: driver, faults, plan, logic, gate, ring, metrics, in real time, in virtual time or cycle by cycle | files rig control plant_sim driver driver_sim runtime experiment analysis config"
   "program | what `abs_hil` decides between its command line and the other rooms | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run"
   # The extras (extras/): what a laboratory may leave out. No room above includes one.
+  "injection | injected faults: a driver in front of any other that spoils what it reads and writes | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
   "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
   "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
   "commands | remote commands over LCM: authority, listener, sender | version cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run program"
@@ -35,4 +36,4 @@ set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files emulator guardian analysis run_fold
 
 # Rooms of extras/, each with a switch: -DABS_HIL_STUDY=OFF leaves one out, -DABS_HIL_EXTRAS=OFF all. One that knows the
 # program has a part in it and defines an `Extra` (src/program/extra.hpp).
-set(ABS_HIL_EXTRA_ROOMS emulator study commands replay interchange)
+set(ABS_HIL_EXTRA_ROOMS injection emulator study commands replay interchange)

@@ -12,7 +12,7 @@
 #include "runtime/realtime_setup.hpp"
 #include "telemetry/message_codec.hpp"
 
-namespace abs_hil::telemetry {
+namespace abs_hil::commands {
 namespace {
 
 constexpr std::size_t packets_per_poll = 32;
@@ -25,7 +25,8 @@ constexpr std::string_view too_long = "too long for a command";
 
 }  // namespace
 
-CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop)
+CommandListener::CommandListener(telemetry::LcmOutlet& outlet, telemetry::MessageStream& stream,
+                                 std::function<void()> on_stop)
     : outlet_(outlet), stream_(stream), on_stop_(std::move(on_stop)) {
   // A log file delivers no messages, and its descriptor cannot be polled.
   if (outlet_.provider() == "file") return;
@@ -116,7 +117,7 @@ void CommandListener::answer_waiting(std::size_t at_most) {
 
 void CommandListener::take(std::span<const std::uint8_t> packet) {
   command_t command{};
-  if (const std::string_view problem = decode_checked(packet, command); !problem.empty()) {
+  if (const std::string_view problem = telemetry::decode_checked(packet, command); !problem.empty()) {
     return hand_over(problem, false);
   }
   const bool is_stop = command.command == "stop";
@@ -179,4 +180,4 @@ CommandListener::Counts CommandListener::counts() const noexcept {
           .dropped = dropped_.load(std::memory_order_relaxed) + dropped_by_kernel_.load(std::memory_order_relaxed)};
 }
 
-}  // namespace abs_hil::telemetry
+}  // namespace abs_hil::commands

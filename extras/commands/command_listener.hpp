@@ -13,11 +13,11 @@
 #include <variant>
 
 #include "abs_hil/command_t.hpp"
+#include "commands/receiver.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_stream.hpp"
-#include "telemetry/receiver.hpp"
 
-namespace abs_hil::telemetry {
+namespace abs_hil::commands {
 
 /// The answer to a command_t.
 struct CommandAnswer {
@@ -49,7 +49,7 @@ class CommandListener {
   /// Outlet and stream must outlive the listener. `on_stop` is called once for every stop; it must not throw; after
   /// listen() it runs in the listening thread. With udpm the listener receives without liblcm (UdpmReceiver) and
   /// also gets this process's own traffic. Throws LcmError if it cannot join udpm's multicast group.
-  CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop);
+  CommandListener(telemetry::LcmOutlet& outlet, telemetry::MessageStream& stream, std::function<void()> on_stop);
 
   /// Sets the judge. Without one every command_t is refused as not enabled.
   void set_judge(CommandJudge judge) { judge_ = std::move(judge); }
@@ -84,8 +84,8 @@ class CommandListener {
   void answer(const Arrival& arrival);
   void say(rig::Reason reason, std::string message, std::uint64_t count, bool always);
 
-  LcmOutlet& outlet_;
-  MessageStream& stream_;
+  telemetry::LcmOutlet& outlet_;
+  telemetry::MessageStream& stream_;
   std::function<void()> on_stop_;
   CommandJudge judge_;
   std::optional<UdpmReceiver> udpm_;
@@ -106,4 +106,4 @@ class CommandListener {
   std::jthread thread_;  ///< the last member: it ends first
 };
 
-}  // namespace abs_hil::telemetry
+}  // namespace abs_hil::commands

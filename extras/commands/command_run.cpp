@@ -54,7 +54,7 @@ class CommandRun final : public program::RunPart {
   run::Run* run_{nullptr};
   telemetry::MessageStream* stream_{nullptr};
   std::optional<RemoteCommands> commands_;
-  std::optional<telemetry::CommandListener> listener_;
+  std::optional<CommandListener> listener_;
 };
 
 /// Receives commands between two runs.
@@ -68,8 +68,8 @@ class StopListener {
     if (run.settings.commands.enabled) sign_answers(stream_, read_key(run.settings.commands.key_file));
     commands_.set_judge([](const command_t& command) {
       const std::string shown = rig::clean_text(command.command, 64);
-      return telemetry::CommandAnswer{rig::Reason::command_not_now,
-                                      "refused '" + shown + "': only stop is accepted between two runs of a series"};
+      return CommandAnswer{rig::Reason::command_not_now,
+                           "refused '" + shown + "': only stop is accepted between two runs of a series"};
     });
     commands_.listen();
   }
@@ -87,7 +87,7 @@ class StopListener {
  private:
   telemetry::LcmOutlet lcm_;
   telemetry::MessageStream stream_;
-  telemetry::CommandListener commands_;
+  CommandListener commands_;
 };
 
 program::StopHeard heard_in_pause(const program::RunRequest& request) {

@@ -48,27 +48,27 @@ RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::Mess
   sign_answers(stream_, key);
 }
 
-std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command_t& command) {
+std::optional<CommandAnswer> RemoteCommands::judge(const command_t& command) {
   const std::string refused = "refused '" + shown(command.command) + "': ";
   if (!authority_) {
-    return telemetry::CommandAnswer{rig::Reason::commands_not_enabled,
-                                    refused +
-                                        "only 'stop' is accepted; start the run with --set commands.enabled=true "
-                                        "--set commands.key_file=FILE, and make FILE before by (umask 077; "
-                                        "openssl rand -hex 32 > FILE)"};
+    return CommandAnswer{rig::Reason::commands_not_enabled,
+                         refused +
+                             "only 'stop' is accepted; start the run with --set commands.enabled=true "
+                             "--set commands.key_file=FILE, and make FILE before by (umask 077; "
+                             "openssl rand -hex 32 > FILE)"};
   }
   if (const rig::Reason reason = authority_->judge(command); reason != rig::Reason::none) {
-    return telemetry::CommandAnswer{reason, refused + why(reason)};
+    return CommandAnswer{reason, refused + why(reason)};
   }
   bool taken = false;
-  telemetry::CommandAnswer answer = carry_out(command, taken);
+  CommandAnswer answer = carry_out(command, taken);
   if (taken) return std::nullopt;
   answer.authentic = true;
   answer.message = refused + answer.message;
   return answer;
 }
 
-telemetry::CommandAnswer RemoteCommands::carry_out(const command_t& command, bool& taken) {
+CommandAnswer RemoteCommands::carry_out(const command_t& command, bool& taken) {
   using rig::Reason;
   if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun yet"};
   if (over_) return {Reason::command_not_now, "the run has ended"};
@@ -163,7 +163,7 @@ void RemoteCommands::send_state() {
     state.last_sequence = authority_->last_sequence();
   }
   if (listener_ != nullptr) {
-    const telemetry::CommandListener::Counts counts = listener_->counts();
+    const CommandListener::Counts counts = listener_->counts();
     state.stops = static_cast<std::int64_t>(counts.stops);
     state.refused = static_cast<std::int64_t>(counts.refused + refused_at_end_);
     state.malformed = static_cast<std::int64_t>(counts.malformed);

@@ -27,10 +27,10 @@ class RemoteCommands final : public rig::RecordSink {
   /// Sets the mailbox that receives changes. Without a mailbox every command is refused as too early.
   void set_mailbox(experiment::AdjustmentMailbox& mailbox) { mailbox_ = &mailbox; }
   /// Sets the listener whose counts ABS_COMMAND_STATE publishes.
-  void set_listener(const telemetry::CommandListener& listener) { listener_ = &listener; }
+  void set_listener(const CommandListener& listener) { listener_ = &listener; }
 
   /// Judges a command for the command listener (CommandJudge).
-  [[nodiscard]] std::optional<telemetry::CommandAnswer> judge(const command_t& command);
+  [[nodiscard]] std::optional<CommandAnswer> judge(const command_t& command);
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
 
@@ -46,7 +46,7 @@ class RemoteCommands final : public rig::RecordSink {
     double value{0.0};
     std::string sender;
   };
-  telemetry::CommandAnswer carry_out(const command_t& command, bool& taken);
+  CommandAnswer carry_out(const command_t& command, bool& taken);
   void settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending);
   void settle_named(rig::Reason reason, std::string_view name);
   void send_state();
@@ -55,7 +55,7 @@ class RemoteCommands final : public rig::RecordSink {
   config::LiveSettings live_;
   std::optional<Authority> authority_{};
   experiment::AdjustmentMailbox* mailbox_{nullptr};
-  const telemetry::CommandListener* listener_{nullptr};
+  const CommandListener* listener_{nullptr};
   std::map<std::uint32_t, Pending> pending_{};
   std::uint64_t accepted_{0};
   std::uint64_t refused_at_end_{0};

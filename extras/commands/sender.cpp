@@ -13,10 +13,10 @@
 #include "abs_hil/rig/reason.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "commands/authority.hpp"
+#include "commands/receiver.hpp"
 #include "rig/formatted_text.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_codec.hpp"
-#include "telemetry/receiver.hpp"
 
 namespace abs_hil::commands {
 
@@ -89,7 +89,7 @@ class Answers {
 
   std::string sender_;
   std::string key_;  ///< empty: every answer counts
-  telemetry::Receiver receiver_;
+  Receiver receiver_;
 };
 
 std::string unique_sender() {

@@ -15,9 +15,9 @@
 #include <type_traits>
 #include <vector>
 
+#include "interchange/file_uri.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/foreign_code.hpp"
-#include "rig/file_uri.hpp"
 
 namespace abs_hil::interchange {
 
@@ -96,7 +96,7 @@ class Instance {
           nullptr, log3, nullptr));
     } else {
       instance_.reset(reinterpret_cast<fmi2InstantiateTYPE*>(instantiate_.at)(
-          "controller", fmi2CoSimulation, facts.token.c_str(), rig::file_uri(resources).c_str(), &callbacks_, fmi2False,
+          "controller", fmi2CoSimulation, facts.token.c_str(), file_uri(resources).c_str(), &callbacks_, fmi2False,
           fmi2False));
     }
   }

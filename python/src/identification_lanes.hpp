@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "identification_plant.hpp"
-#include "plant_sim/lanes/lane_plant.hpp"
+#include "lanes/lane_plant.hpp"
 #include "study/lanes/lane_jobs.hpp"
 
 namespace abs_hil::python {

@@ -12,6 +12,7 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "files/result_file.hpp"
+#include "injection/injecting_driver.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/event_log.hpp"
 #include "version/build_facts.hpp"
@@ -49,6 +50,7 @@ PYBIND11_MODULE(_core, module) {
   module.attr("revision") = version::build_facts().git_revision;
   module.def("set_config_dir", [](const std::string& folder) { config::set_own_config_dir(folder); });
   module.def("config_dir", [] { return config::config_dir().string(); });
+  injection::begin();
   python::add_controllers(module);
   python::add_plant(module);
   python::add_simulation(module);

@@ -18,13 +18,13 @@
 #include <vector>
 
 #include "commands/authority.hpp"
+#include "commands/receiver.hpp"
 #include "commands/sender.hpp"
 #include "interchange/confinement.hpp"
 #include "interchange/foreign_controller.hpp"
 #include "interchange/hosted_code.hpp"
 #include "python_law.hpp"
 #include "telemetry/lcm_outlet.hpp"
-#include "telemetry/receiver.hpp"
 
 namespace {
 
@@ -84,7 +84,7 @@ class Subscription {
 
  private:
   std::deque<std::pair<std::string, std::string>> received_;
-  telemetry::Receiver receiver_;
+  commands::Receiver receiver_;
 };
 
 /// Sends what `abs_hil send` sends, with the same authority. (accepted, the answer in words)

@@ -12,7 +12,7 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/option_check.hpp"
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 
 namespace abs_hil::config {
 
@@ -84,10 +84,10 @@ void refuse_unfit_options(const Settings& s, bool virtual_time) {
 }
 
 void refuse_injection_into_hardware(const Settings& s) {
-  const std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
+  const std::vector<Injection> injections = parse_injections(s.inject);
   if (injections.empty()) return;
   const driver::DriverOptions& d = s.driver;
-  const std::string fault = driver::to_text(injections.front());
+  const std::string fault = to_text(injections.front());
   if (!d.emulated) {
     throw std::invalid_argument(
         fmt::format("--inject {}: faults are never injected into real hardware; use --backend sim, or for an emulator "

@@ -16,9 +16,9 @@
 #include "abs_hil/control/registry.hpp"
 #include "config/board_policy.hpp"
 #include "config/config_error.hpp"
+#include "config/injection.hpp"
 #include "config/key_table.hpp"
 #include "config/plan.hpp"
-#include "driver/injection/injection.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/nearest_name.hpp"
 
@@ -195,8 +195,7 @@ void fill(Settings& s, KeyTable& keys, const Sources& sources, const Said& said,
   for (const Setting& setting : script.settings) keys.set(setting.key, setting.value, script.at(setting.place));
   set_all(said.above, keys);
   for (const std::string& injection : sources.injections) {
-    if (driver::parse_injections(injection).empty())
-      throw ConfigError("--inject is empty; give a fault, or leave it out");
+    if (parse_injections(injection).empty()) throw ConfigError("--inject is empty; give a fault, or leave it out");
     s.inject += (s.inject.empty() ? "" : ",") + injection;
   }
   if (s.on_rig()) complete_identity(s, keys);
@@ -228,7 +227,7 @@ void merge_into(Configuration& merged, KeyTable& keys, const Sources& sources) {
   }
   if (s.on_rig()) refuse_events(script, s.driver.emulated);
   apply(script, s);
-  static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
+  static_cast<void>(parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
   if (s.on_rig()) {
     check_consents(s, keys);
     const SafetyView view = view_of(script, s, keys);

@@ -12,8 +12,8 @@
 
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
+#include "config/injection.hpp"
 #include "config/reader.hpp"
-#include "driver/injection/injection.hpp"
 #include "rig/run_names.hpp"
 
 namespace abs_hil::config {
@@ -170,7 +170,7 @@ void EventScript::check(const TableReader& reader) {
                   "an event with inject takes no other key; give the time in inject, as in \"brake@write:off+0.2s\"");
     }
     try {
-      if (driver::parse_injections(inject).empty()) reader.fail(entry->place, "inject is empty; give a fault");
+      if (parse_injections(inject).empty()) reader.fail(entry->place, "inject is empty; give a fault");
     } catch (const std::invalid_argument& error) {
       reader.fail(entry->place, error.what());
     }

@@ -90,20 +90,6 @@ Findings check_lcm(const Examination& e) {
   return {std::move(finding)};
 }
 
-Findings check_can(const Examination& e) {
-  try {
-    return judge(driver::can::can_interfaces(), has_can_sockets(), e.rate_Hz);
-  } catch (const driver::Unavailable& error) {
-    return {{.check = "can", .what = "CAN interfaces", .standing = Standing::note, .detail = error.what()}};
-  }
-}
-
-Findings check_hm2(const Examination& e) {
-  // It sends datagrams, so only to a board that is named.
-  if (e.driver.kind == "hm2") return scan_hm2(*e.driver.boards.find("hm2")->as<driver::hm2::Hm2Options>());
-  return {{.check = "hm2", .what = "no hm2 board is configured (driver.kind)", .standing = Standing::note}};
-}
-
 Finding commissioning_finding(const Examination& e, const driver::RigDriver& driver) {
   Finding finding{.check = "backend", .what = "commissioning of the board", .detail = "its record holds"};
   try {
@@ -159,19 +145,29 @@ Findings check_boards(const Examination& e) {
 
 struct Check {
   std::string_view name;
-  Findings (*make)(const Examination&);
+  std::function<Findings(const Examination&)> make;
 };
-constexpr std::array<Check, 9> checks{{
-    {"kernel", [](const Examination&) { return machine_part("kernel"); }},
-    {"realtime", check_realtime},
-    {"clock", [](const Examination&) { return machine_part("clock"); }},
-    {"cpu", [](const Examination&) { return machine_part("cpu"); }},
-    {"lcm", check_lcm},
-    {"can", check_can},
-    {"hm2", check_hm2},
-    {"boards", check_boards},
-    {"backend", check_backend},
-}};
+
+std::vector<Check> checks() {
+  std::vector<Check> all{{"kernel", [](const Examination&) { return machine_part("kernel"); }},
+                         {"realtime", check_realtime},
+                         {"clock", [](const Examination&) { return machine_part("clock"); }},
+                         {"cpu", [](const Examination&) { return machine_part("cpu"); }},
+                         {"lcm", check_lcm}};
+  for (const driver::Backend& backend : driver::registered_backends()) {
+    if (!backend.inspect) continue;
+    all.push_back({backend.name, [&backend](const Examination& e) {
+                     const driver::BoardOptions* options = e.driver.boards.find(backend.name);
+                     if (options == nullptr) return Findings{};
+                     Findings findings = backend.inspect(*options, e.rate_Hz, e.driver.kind == backend.name);
+                     for (Finding& finding : findings) finding.check = backend.name;
+                     return findings;
+                   }});
+  }
+  all.push_back({"boards", check_boards});
+  all.push_back({"backend", check_backend});
+  return all;
+}
 
 }  // namespace
 
@@ -217,14 +213,13 @@ std::vector<Finding> judge(std::string_view kind, const std::vector<driver::Foun
 
 std::vector<std::string> check_names() {
   std::vector<std::string> names;
-  names.reserve(checks.size());
-  for (const Check& check : checks) names.emplace_back(check.name);
+  for (const Check& check : checks()) names.emplace_back(check.name);
   return names;
 }
 
 std::vector<Finding> examine(const Examination& examination) {
   Findings all;
-  for (const Check& check : checks) {
+  for (const Check& check : checks()) {
     if (!examination.only.empty() && examination.only != check.name) continue;
     for (Finding& finding : check.make(examination)) all.push_back(std::move(finding));
   }

@@ -1,6 +1,7 @@
 // Makes the parts of a run of its settings and drives its cycle in real or virtual time.
 #include "run/run.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -11,10 +12,9 @@
 #include <thread>
 #include <utility>
 
+#include "config/config_error.hpp"
 #include "config/script.hpp"
 #include "driver/factory.hpp"
-#include "driver/injection/injecting_driver.hpp"
-#include "driver/injection/injection.hpp"
 #include "driver/sim/sim_driver.hpp"
 
 namespace abs_hil::run {
@@ -52,15 +52,19 @@ std::unique_ptr<runtime::Clock> clock_of(const Given& given) {
   return std::make_unique<runtime::VirtualClock>();
 }
 
+InjectFaults injects = nullptr;
+
 /// The driver with the injected faults of the settings around it, if there are any.
 std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const config::Settings& s,
                                                runtime::Clock& clock) {
-  std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
-  if (injections.empty()) return driver;
-  for (const driver::Injection& injection : injections) spdlog::warn("fault injected: {}", driver::to_text(injection));
-  return std::make_unique<driver::InjectingDriver>(
-      std::move(driver), std::move(injections), static_cast<std::uint64_t>(s.seed),
-      [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
+  const std::vector<config::Injection> faults = config::parse_injections(s.inject);
+  if (faults.empty()) return driver;
+  if (injects == nullptr) {
+    throw config::ConfigError(fmt::format(
+        "run.inject = {}: this build injects no faults; configure it with -DABS_HIL_INJECTION=ON", s.inject));
+  }
+  for (const config::Injection& fault : faults) spdlog::warn("fault injected: {}", config::to_text(fault));
+  return injects(std::move(driver), faults, static_cast<std::uint64_t>(s.seed), clock);
 }
 
 const plant_sim::PlantOptions& plant_of(const Prepared& prepared, const Given& given) noexcept {
@@ -90,6 +94,8 @@ experiment::RunLogicParts parts_of(const Prepared& prepared, const Given& given)
 }
 
 }  // namespace
+
+void inject_by(InjectFaults inject) noexcept { injects = inject; }
 
 std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s) {
   return make_driver(s, false, s.plant, config::sensor_seed(s));

@@ -17,6 +17,7 @@
 #include "analysis/friction_curve.hpp"
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
+#include "config/injection.hpp"
 #include "config/plan.hpp"
 #include "config/script.hpp"
 #include "config/settings.hpp"
@@ -185,6 +186,13 @@ class Run final : private runtime::Outputs {
   driver::IoResult safe_state_{};
   bool ran_{false};
 };
+
+/// Puts a driver that injects faults in front of another one. It waits by the clock, which outlives it.
+using InjectFaults = std::unique_ptr<driver::RigDriver> (*)(std::unique_ptr<driver::RigDriver> driver,
+                                                            const std::vector<config::Injection>& faults,
+                                                            std::uint64_t seed, runtime::Clock& clock);
+/// Runs inject faults by this, from now on (the extra `injection`). Until then a run with injected faults is refused.
+void inject_by(InjectFaults inject) noexcept;
 
 /// The driver of the settings' backend in real time, without injected faults. Throws driver::Unavailable.
 [[nodiscard]] std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& settings);

@@ -17,7 +17,7 @@ struct Bench {
   test::CapturingOutlet captured;
   MessageStream stream{{}, {}, {}};
   int stop_calls{0};
-  CommandListener listener{outlet, stream, [this] { ++stop_calls; }};
+  commands::CommandListener listener{outlet, stream, [this] { ++stop_calls; }};
 
   Bench() {
     stream.add(captured);
@@ -137,7 +137,7 @@ TEST_CASE("a stop that the thread received is answered at the end; later packets
 TEST_CASE("without a server nothing is received, and polling is harmless") {
   LcmOutlet outlet("tcpq://127.0.0.1:1");
   MessageStream stream({}, {}, {});
-  CommandListener listener(outlet, stream, {});
+  commands::CommandListener listener(outlet, stream, {});
   listener.poll();
   CHECK_FALSE(listener.stop_requested());
 }
@@ -146,7 +146,7 @@ TEST_CASE("a log file as LCM network has no listener") {
   const abs_hil::test::TemporaryFolder scratch;
   LcmOutlet outlet("file://" + (scratch / "x.lcmlog").string() + "?mode=w");
   MessageStream stream({}, {}, {});
-  CommandListener listener(outlet, stream, {});
+  commands::CommandListener listener(outlet, stream, {});
   CHECK_FALSE(listener.listening());
   listener.poll();
 }

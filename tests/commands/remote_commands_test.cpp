@@ -105,7 +105,7 @@ TEST_CASE("after the run's end a command is refused with that reason") {
 TEST_CASE("a change refused for lack of room has no effect and can be sent again") {
   Bench bench;
   std::int64_t sequence = 0;
-  std::optional<telemetry::CommandAnswer> answer;
+  std::optional<commands::CommandAnswer> answer;
   while (!answer) answer = bench.remote.judge(bench.slip_ref(++sequence, 0.1));
   CHECK(answer->message == "refused 'slip-ref': too many changes at once: send it again");
   CHECK(bench.remote.judge(bench.command(++sequence, "start", 0.0)).has_value());

@@ -31,7 +31,49 @@ class Board final : public driver::RigDriver {
   bool there_;
 };
 
+struct SlotOptions {
+  ABS_HIL_OPTIONS(SlotOptions);
+  ABS_HIL_OPTION(std::string, slot, "slot 3", .meaning = "the slot of the board");
+};
+
+/// A laboratory's own backend, which tells the doctor what leads to its board.
+void register_slot() {
+  static const bool done = [] {
+    driver::register_backend(driver::backend<SlotOptions>(
+        {.name = "slot",
+         .summary = "a board in a slot",
+         .not_verified = "Nobody has seen it",
+         .make_driver = [](const SlotOptions&, const driver::RunFacts&) -> std::unique_ptr<driver::RigDriver> {
+           return std::make_unique<Board>(true);
+         },
+         .make_safe_state_writer = [](const SlotOptions&, const driver::RunFacts&)
+             -> std::unique_ptr<driver::SafeStateWriter> { return nullptr; },
+         .outputs = [](const SlotOptions&) { return driver::OutputGrid{.duty_steps = 100}; },
+         .inspect =
+             [](const SlotOptions& options, double rate_Hz, bool chosen) {
+               return std::vector<Finding>{{.what = options.slot + (chosen ? ", chosen" : ""),
+                                            .standing = rate_Hz > 1000.0 ? Standing::warning : Standing::good}};
+             }}));
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
 }  // namespace
+
+TEST_CASE("a laboratory's own backend has a check of its own, by its row alone") {
+  register_slot();
+  Examination examination{.only = "slot", .rate_Hz = 2000.0};
+  examination.driver.boards.of<SlotOptions>().slot = "slot 5";
+  const auto findings = examine(examination);
+  REQUIRE(findings.size() == 1);
+  CHECK(findings.front().check == "slot");
+  CHECK(findings.front().what == "slot 5");
+  CHECK(findings.front().standing == Standing::warning);
+  CHECK_FALSE(turned_out_well(examination, findings));
+  examination.driver.kind = "slot";
+  CHECK(examine(examination).front().what == "slot 5, chosen");
+}
 
 TEST_CASE("the backend can run if its driver configures; it is not activated") {
   const auto examination = only_backend([] { return std::make_unique<Board>(true); });

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 #include "experiment/injected_run.hpp"
 
 using namespace abs_hil;
@@ -20,12 +20,12 @@ using namespace abs_hil::experiment::test;
 
 namespace {
 
-using driver::InjectionKind;
-using driver::InjectionSignal;
+using config::InjectionKind;
+using config::InjectionSignal;
 
 /// One case. RapidCheck shrinks every number towards 0: no fault, the first rate, short reads, the right model.
 struct Case {
-  std::vector<driver::Injection> faults{};
+  std::vector<config::Injection> faults{};
   double rate_Hz{1000.0};
   double read_share{0.0};   ///< duration of each read as a part of the period
   double model_error{0.0};  ///< relative, of J1, J2, c31 or the brake map
@@ -37,7 +37,7 @@ std::string text_of(const Case& c) {
   std::string text = "rate " + std::to_string(c.rate_Hz) + " Hz, reads take " + std::to_string(c.read_share) +
                      " of a period, seed " + std::to_string(c.seed) + ", model parameter " +
                      std::to_string(c.wrong_parameter) + " wrong by " + std::to_string(c.model_error) + ", faults";
-  for (const driver::Injection& fault : c.faults) text.append(" ").append(driver::to_text(fault));
+  for (const config::Injection& fault : c.faults) text.append(" ").append(config::to_text(fault));
   return text;
 }
 
@@ -46,14 +46,14 @@ T one_of(const std::vector<T>& choices) {
   return choices[*rc::gen::inRange<std::size_t>(0, choices.size())];
 }
 
-driver::Injection any_fault() {
-  driver::Injection fault = driver::parse_injection(
+config::Injection any_fault() {
+  config::Injection fault = config::parse_injection(
       std::string(rig::name_of(one_of<rig::Phase>({rig::Phase::brake, rig::Phase::hold, rig::Phase::stopped}))) + '@' +
-      std::string(driver::name_of(
-          static_cast<InjectionSignal>(*rc::gen::inRange(0, static_cast<int>(driver::injection_signal_count))))) +
+      std::string(config::name_of(
+          static_cast<InjectionSignal>(*rc::gen::inRange(0, static_cast<int>(config::injection_signal_count))))) +
       ':' +
-      std::string(driver::name_of(
-          static_cast<InjectionKind>(*rc::gen::inRange(0, static_cast<int>(driver::injection_kind_count))))));
+      std::string(config::name_of(
+          static_cast<InjectionKind>(*rc::gen::inRange(0, static_cast<int>(config::injection_kind_count))))));
   // The checks know a wheel only once it has been seen turning: a run that begins at speed begins without faults.
   fault.delay_s = *rc::gen::inRange(50, 2000) * 1e-3;
   if (*rc::gen::arbitrary<bool>()) fault.duration_s = *rc::gen::inRange(1, 500) * 1e-3;
@@ -88,7 +88,7 @@ InjectedResult run_case(const Case& c) {
   setup.seed = c.seed;
   setup.model = setup.plant.rig;
   make_wrong(*setup.model, c);
-  std::vector<driver::Injection> faults = c.faults;
+  std::vector<config::Injection> faults = c.faults;
   if (c.read_share > 0.0) faults.push_back(slow_reads(c.read_share, c.rate_Hz));
   return run_injected(setup, faults);
 }
@@ -108,7 +108,7 @@ bool finite(const rig::CycleRecord& r) {
 bool releases(const rig::Command& command) { return command.motor_duty == 0.0 && command.brake_duty == 0.0; }
 
 /// True for a fault after which counts no longer follow a wheel at all.
-bool blinds(const driver::Injection& fault) {
+bool blinds(const config::Injection& fault) {
   const bool encoder = fault.signal == InjectionSignal::encoder_upper ||
                        fault.signal == InjectionSignal::encoder_lower || fault.signal == InjectionSignal::encoders;
   const bool kind =
@@ -134,7 +134,7 @@ double braked_blind_s(const Case& c, const InjectedResult& run) {
   }
   if (start_s < 0.0) return 0.0;
   double longest_s = 0.0;
-  for (const driver::Injection& fault : c.faults) {
+  for (const config::Injection& fault : c.faults) {
     if (!blinds(fault)) continue;
     const double from_s = start_s + fault.delay_s;
     for (const rig::CycleRecord& r : run.records) {

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "driver/injection/injecting_driver.hpp"
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
+#include "injection/injecting_driver.hpp"
 #include "simulated_run.hpp"
 
 namespace abs_hil::experiment::test {
@@ -19,16 +19,16 @@ struct InjectedResult {
 };
 
 /// Every read takes this part of the period.
-inline driver::Injection slow_reads(double share, double rate_Hz) {
-  return driver::parse_injection("any@read:slow=" + std::to_string(share / rate_Hz) + "s");
+inline config::Injection slow_reads(double share, double rate_Hz) {
+  return config::parse_injection("any@read:slow=" + std::to_string(share / rate_Hz) + "s");
 }
 
-inline InjectedResult run_injected(const Setup& setup, const std::vector<driver::Injection>& faults) {
+inline InjectedResult run_injected(const Setup& setup, const std::vector<config::Injection>& faults) {
   runtime::VirtualClock clock;
   auto rig = std::make_unique<driver::SimDriver>(
       setup.plant, driver::SimStart{.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
   const driver::SimDriver& sim = *rig;
-  driver::InjectingDriver driver(std::move(rig), faults, setup.seed, [&clock](std::int64_t duration_ns) {
+  injection::InjectingDriver driver(std::move(rig), faults, setup.seed, [&clock](std::int64_t duration_ns) {
     clock.sleep_until(clock.now_ns() + duration_ns);
   });
   Recorder recorder;

@@ -42,9 +42,9 @@ double exposure_s(const config::Settings& s, const std::string& fault) {
   constexpr double longest_s = 130.0;
   const Setup setup{
       .plant = s.plant, .control = s.control, .experiment = s.experiment, .gate = s.gate, .model = s.model};
-  const driver::Injection injection = driver::parse_injection(fault);
+  const config::Injection injection = config::parse_injection(fault);
   runtime::VirtualClock clock;
-  driver::InjectingDriver driver(
+  injection::InjectingDriver driver(
       std::make_unique<driver::SimDriver>(setup.plant, driver::SimStart{.seed = 1}), {injection}, 1,
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   Recorder recorder;

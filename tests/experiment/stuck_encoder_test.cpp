@@ -34,7 +34,7 @@ bool names_it(rig::Reason reason) {
 Found found(const std::string& controller, double rate_Hz, double share, const std::string& delay_s) {
   Setup setup = braking(controller);
   setup.control.rate_Hz = rate_Hz;
-  std::vector<driver::Injection> faults{driver::parse_injection("brake@encoder_upper:stuck+" + delay_s + "s")};
+  std::vector<config::Injection> faults{config::parse_injection("brake@encoder_upper:stuck+" + delay_s + "s")};
   if (share > 0.0) faults.push_back(slow_reads(share, rate_Hz));
   const InjectedResult run = run_injected(setup, faults);
   return {run.outcome.reason, run.records.back().time_s - std::stod(delay_s)};

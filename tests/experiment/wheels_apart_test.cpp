@@ -117,7 +117,7 @@ TEST_CASE("faults of one wheel are found while the wheels are apart") {
                         Case{"accelerate@motor_pwm:stuck+1s,accelerate@enable:stuck+1s",
                              Reason::speed_rises_with_motor_off, "lifted"}}) {
     CAPTURE(c.fault);
-    const InjectedResult result = run_injected(lifted(), driver::parse_injections(c.fault));
+    const InjectedResult result = run_injected(lifted(), config::parse_injections(c.fault));
     CHECK(result.outcome.reason == c.reason);
     const Setup setup = lifted();
     CHECK(setup.plans.at(result.records.back().phase_index).name == c.phase);

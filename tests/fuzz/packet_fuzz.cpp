@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "commands/receiver.hpp"
 #include "rig/formatted_text.hpp"
 #include "telemetry/message_codec.hpp"
-#include "telemetry/receiver.hpp"
 
 using namespace abs_hil;
 
@@ -37,8 +37,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const char magic : {'\0', '2', '3'}) {
     std::vector<std::uint8_t> datagram(raw.begin(), raw.end());
     if (magic != '\0') datagram.insert(datagram.begin(), {'L', 'C', '0', static_cast<std::uint8_t>(magic)});
-    const auto packet = telemetry::look_at(datagram, "ABS_COMMAND");
-    const bool message = packet.kind == telemetry::LcmPacket::Kind::message;
+    const auto packet = commands::look_at(datagram, "ABS_COMMAND");
+    const bool message = packet.kind == commands::LcmPacket::Kind::message;
     if (message != (packet.payload.data() != nullptr)) std::abort();
     if (!message) continue;
     const std::uint8_t* const end = datagram.data() + datagram.size();

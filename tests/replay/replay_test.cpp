@@ -12,10 +12,10 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
+#include "config/injection.hpp"
 #include "config/plan.hpp"
-#include "driver/injection/injecting_driver.hpp"
-#include "driver/injection/injection.hpp"
 #include "experiment/simulated_run.hpp"
+#include "injection/injecting_driver.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
@@ -110,14 +110,14 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   stream.add(log);
   LateMeasurement late(stream, recipe);
   runtime::VirtualClock clock;
-  driver::InjectingDriver driver(
+  injection::InjectingDriver driver(
       std::make_unique<LosesCommands>(
           std::make_unique<driver::SimDriver>(
               s.plant, driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
                                         .start_speed_rad_s = s.experiment.start_speed_rad_s,
                                         .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)}),
           recipe.loses_every),
-      driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
+      config::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   run::Run run(prepared, {.clock = &clock, .driver = &driver});
   run.record_into({&late});

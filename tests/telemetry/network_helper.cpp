@@ -12,11 +12,11 @@
 #include <thread>
 
 #include "commands/command_listener.hpp"
+#include "commands/receiver.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/message_stream.hpp"
-#include "telemetry/receiver.hpp"
 #include "telemetry/sample_records.hpp"
 
 namespace abs_hil::telemetry {
@@ -66,7 +66,7 @@ int publish(const std::string& url, std::uint64_t count, int period_us, const ch
   MessageStream stream({}, {{0, 0, "paper", "adaptive", "paper-table1", "sim", "{}", "0.1.0"}}, {});
   stream.add(outlet);
   stream.add(log);
-  CommandListener listener(outlet, stream, {});
+  commands::CommandListener listener(outlet, stream, {});
   const auto start = std::chrono::steady_clock::now();
   auto wake_up = start;
   std::uint64_t sent = 0;
@@ -128,7 +128,7 @@ class LossCounter {
 
 /// A tcpq server hears of a subscription when its thread comes to it, up to some 0.1 s later. Waits until it hands on
 /// what another client publishes. False if that does not come within 10 s.
-bool await_subscription(const std::string& url, Receiver& listener, const LossCounter& counter) {
+bool await_subscription(const std::string& url, commands::Receiver& listener, const LossCounter& counter) {
   lcm::LCM other(url);
   const status_t message{};
   for (int tries = 0; tries < 1'000 && !counter.subscribed; ++tries) {
@@ -142,8 +142,8 @@ bool await_subscription(const std::string& url, Receiver& listener, const LossCo
 /// Until nothing has come for `silence_s`, 30 s for the first.
 int receive(const std::string& url, int silence_s) {
   LossCounter counter;
-  Receiver listener(url, "ABS_(TELEMETRY|STATUS|EVENT|EXPERIMENT)",
-                    [&](const std::string& channel, auto packet) { counter.take(channel, packet); });
+  commands::Receiver listener(url, "ABS_(TELEMETRY|STATUS|EVENT|EXPERIMENT)",
+                              [&](const std::string& channel, auto packet) { counter.take(channel, packet); });
   if (url.starts_with("tcpq:") && !await_subscription(url, listener, counter)) {
     std::fprintf(stderr, "the server of %s does not hand on what is published\n", url.c_str());
     return 3;

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "interchange/file_uri.hpp"
 #include "interchange/fmu/model.hpp"
-#include "rig/file_uri.hpp"
 
 namespace abs_hil::interchange::fmu {
 
@@ -143,7 +143,7 @@ void set_values(Component& component, const Reference* references, std::size_t c
 
 /// The folder of an FMU's resources: FMI 2 gives its URI, FMI 3 its path.
 [[nodiscard]] inline std::filesystem::path resources_at(const char* place) {
-  const std::string path = rig::path_of_uri(place == nullptr ? "" : place);
+  const std::string path = interchange::path_of_uri(place == nullptr ? "" : place);
   return std::u8string(path.begin(), path.end());
 }
 

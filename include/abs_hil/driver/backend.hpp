@@ -77,6 +77,18 @@ struct FoundBoard {
   std::vector<Obstacle> obstacles{};
 };
 
+/// One item of this computer, as `abs_hil doctor` found it.
+struct Finding {
+  /// A note needs no action, a warning costs quality, and after a failure the backend cannot run.
+  enum class Standing : std::uint8_t { good, note, warning, failure };
+
+  std::string check{};  ///< name of its check, as in `abs_hil doctor --only CHECK`; of a backend's `inspect` its name
+  std::string what{};   ///< the item, as "SCHED_FIFO priority 80"
+  Standing standing{Standing::good};
+  std::string detail{};  ///< the observation
+  std::string fix{};     ///< commands or advice, one per line; empty if no action is needed
+};
+
 /// The options of one backend.
 using BoardOptions = rig::OptionBox;
 
@@ -91,6 +103,7 @@ struct Backend {
   std::function<OutputGrid(const BoardOptions&)> outputs;
   std::function<BoardReality(const BoardOptions&)> reality{};
   std::function<std::vector<FoundBoard>(const BoardOptions&)> find{};
+  std::function<std::vector<Finding>(const BoardOptions&, double rate_Hz, bool chosen)> inspect{};
   std::function<void(const BoardOptions&, const RunFacts&)> check{};
   std::function<std::string(const BoardOptions&)> udp_peer{};
   std::vector<std::string_view> free_options{};
@@ -114,6 +127,9 @@ struct BackendRow {
   /// Finds the boards that the options do not exclude. Null: it cannot look for boards; then there is one, which the
   /// options name.
   std::vector<FoundBoard> (*find)(const Options&) = nullptr;
+  /// Looks at what leads to the board, for `abs_hil doctor`; `chosen`: driver.kind names it. Writes to no board, and
+  /// sends only to a chosen one. Null: the doctor says no more than `find` does.
+  std::vector<Finding> (*inspect)(const Options&, double rate_Hz, bool chosen) = nullptr;
   /// Checks options against the run. Throws std::invalid_argument. Null: nothing to check.
   void (*check)(const Options&, const RunFacts&) = nullptr;
   /// Of a board that is reached by UDP: its address and port as /proc/net/udp has them, to find foreign writers.
@@ -157,6 +173,7 @@ Backend backend(const BackendRow<Options>& row, Options defaults) {
                 .outputs = with(row.outputs)};
   if (row.reality != nullptr) entry.reality = with(row.reality);
   if (row.find != nullptr) entry.find = with(row.find);
+  if (row.inspect != nullptr) entry.inspect = with(row.inspect);
   if (row.check != nullptr) entry.check = with(row.check);
   if (row.udp_peer != nullptr) entry.udp_peer = with(row.udp_peer);
   entry.free_options = row.free_options;

@@ -43,6 +43,13 @@ struct InterfaceFacts {
 /// What prevents the use of an interface, and the command that mends it.
 [[nodiscard]] std::optional<FoundBoard::Obstacle> problem_of(const InterfaceFacts& facts);
 
+/// What `abs_hil doctor` says: each interface with its state, its bit rate and the load of a run at `rate_Hz`, then the
+/// load on a bus of 1 Mbit/s. A missing interface, or missing kernel support, is a note. The load of a vcan interface
+/// is meaningless. @param can_sockets  whether this kernel has them
+[[nodiscard]] std::vector<Finding> judge(const std::vector<InterfaceFacts>& interfaces, bool can_sockets,
+                                         double rate_Hz);
+[[nodiscard]] std::vector<Finding> inspect(const CanOptions& options, double rate_Hz, bool chosen);
+
 /// Sends and receives frames (`struct can_frame` or `struct canfd_frame`) on a socket that keeps message boundaries: a
 /// raw CAN socket, or for emulators and tests an AF_UNIX socket of type SOCK_SEQPACKET or SOCK_DGRAM. Only `receive`
 /// blocks, up to its deadline. `send` and `receive` are real-time safe apart from their system calls. Both fail with

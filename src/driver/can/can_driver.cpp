@@ -274,6 +274,7 @@ Backend can_backend() {
       .make_safe_state_writer = make_can_writer,
       .outputs = output_grid,
       .reality = can_reality,
+      .inspect = inspect,
       .check = refuse_long_watchdog,
       .free_options = {"interface", "fd", "answer_timeout_us", "loss_cost", "loss_relief", "loss_limit",
                        "plausible_speed_rad_s"},

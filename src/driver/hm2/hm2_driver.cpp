@@ -334,6 +334,7 @@ Backend hm2_backend() {
       .make_safe_state_writer = make_writer,
       .outputs = output_grid,
       .reality = reality,
+      .inspect = inspect,
       .check = check,
       .udp_peer =
           [](const Hm2Options& options) {

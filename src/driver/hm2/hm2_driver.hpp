@@ -20,6 +20,13 @@ namespace abs_hil::driver::hm2 {
 /// 12 bits: value/4096, so the largest duty is 4095/4096.
 [[nodiscard]] OutputGrid output_grid(const Hm2Options& options) noexcept;
 
+/// What `abs_hil doctor` says of the network to the board. Reads only.
+[[nodiscard]] std::vector<Finding> inspect(const Hm2Options& options, double rate_Hz, bool chosen);
+/// One in `times_us` for each answer; `asked` requests. `foreign`: packets that others sent meanwhile.
+[[nodiscard]] Finding judge_round_trips(std::vector<double> times_us, int asked, int foreign);
+/// What the kernel's ARP table, as text, has for the address.
+[[nodiscard]] Finding judge_arp(const std::string& table, const std::string& address, const std::string& interface);
+
 using OpenLink = std::function<std::unique_ptr<Link>()>;
 
 inline constexpr std::uint32_t quadrature_error = 0x8000;  ///< of a counter's control register

@@ -70,10 +70,10 @@ double stamp_error_s(const Conditions& c) { return c.read_share / c.rate_Hz; }
 /// When a fault begins to show. One of the brake does not before braking. A brake that holds on is right until the
 /// wheel stands. A counter that is only renewed every T shows more counts than a wheel at twice the overspeed (with 1
 /// ms and the errors of two stamps) once its wheel is fast enough.
-double matters_from_s(const driver::Injection& fault, const Conditions& c, double overspeed_rad_s, rig::Reason reason,
+double matters_from_s(const config::Injection& fault, const Conditions& c, double overspeed_rad_s, rig::Reason reason,
                       const std::vector<rig::CycleRecord>& records, double fault_s) {
-  using driver::InjectionKind;
-  using driver::InjectionSignal;
+  using config::InjectionKind;
+  using config::InjectionSignal;
   double from_s = fault_s;
   const auto not_before = [&](auto&& shows) {
     const auto first =
@@ -95,7 +95,7 @@ double matters_from_s(const driver::Injection& fault, const Conditions& c, doubl
   return from_s;
 }
 
-Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
+Outcome outcome_of(const config::Injection& fault, const Conditions& c) {
   Setup setup;
   setup.control.rate_Hz = c.rate_Hz;
   if (fault.phase == rig::Phase::brake) setup.experiment.start_speed_rad_s = 170.0;
@@ -103,7 +103,7 @@ Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
   setup.model = setup.plant.rig;
   if (c.wheel != nullptr) setup.model->wheels.*c.wheel *= c.factor;
   if (c.brake != nullptr) setup.model->brake.*c.brake *= c.factor;
-  std::vector<driver::Injection> faults{fault};
+  std::vector<config::Injection> faults{fault};
   if (c.read_share > 0.0) faults.insert(faults.begin(), slow_reads(c.read_share, c.rate_Hz));
   const InjectedResult run = run_injected(setup, faults);
   const auto began = std::ranges::find_if(run.records, [&](const auto& r) { return r.phase == fault.phase; });
@@ -118,10 +118,10 @@ Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
           .stops = std::abs(last.truth.speeds.omega2_rad_s) < stands_rad_s};
 }
 
-std::vector<driver::Injection> faults_in(rig::Phase phase) {
-  std::vector<driver::Injection> all = all_injections(Backend::sim);
+std::vector<config::Injection> faults_in(rig::Phase phase) {
+  std::vector<config::Injection> all = all_injections(Backend::sim);
   std::erase_if(
-      all, [phase](const driver::Injection& i) { return i.phase != phase || i.kind == driver::InjectionKind::ok; });
+      all, [phase](const config::Injection& i) { return i.phase != phase || i.kind == config::InjectionKind::ok; });
   return all;
 }
 
@@ -129,12 +129,12 @@ std::vector<driver::Injection> faults_in(rig::Phase phase) {
 struct Table {
   std::string title;
   std::vector<Conditions> columns;
-  std::vector<driver::Injection> faults;
+  std::vector<config::Injection> faults;
   std::vector<std::vector<Outcome>> rows{};
 };
 
 Table filled(Table table) {
-  for (const driver::Injection& fault : table.faults) {
+  for (const config::Injection& fault : table.faults) {
     std::vector<Outcome>& row = table.rows.emplace_back();
     for (const Conditions& c : table.columns) row.push_back(outcome_of(fault, c));
   }
@@ -166,11 +166,11 @@ std::string csv() {
   std::string text = "conditions,column,signal,fault,reason,after_ms\n";
   for (const Table& table : tables()) {
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
-      const driver::Injection& fault = table.faults[row];
+      const config::Injection& fault = table.faults[row];
       for (std::size_t n = 0; n < table.columns.size(); ++n) {
         const Outcome& o = table.rows[row][n];
         text.append("\"").append(table.title).append("\",").append(table.columns[n].name).append(",");
-        text.append(driver::name_of(fault.signal)).append(",").append(driver::name_of(fault.kind));
+        text.append(config::name_of(fault.signal)).append(",").append(config::name_of(fault.kind));
         text += ',';
         if (o.reason != rig::Reason::sequence_complete) text += std::to_string(static_cast<int>(o.reason));
         text += ',';
@@ -184,7 +184,7 @@ std::string csv() {
 
 /// Longest time to the safe state under conditions. Each term is stated in docs/safety.md, "Slower cycles and
 /// readings"; none is measured.
-double allowed_s(const driver::Injection& fault, const Expectation& expectation, const Conditions& c,
+double allowed_s(const config::Injection& fault, const Expectation& expectation, const Conditions& c,
                  rig::Reason reason) {
   using rig::Reason;
   const double period_s = 1.0 / c.rate_Hz;
@@ -211,7 +211,7 @@ double allowed_s(const driver::Injection& fault, const Expectation& expectation,
     case Reason::encoders_lost:
     case Reason::encoders_disagree:
     case Reason::slip_implausible: {
-      const bool by_chance = fault.kind == driver::InjectionKind::intermittent;
+      const bool by_chance = fault.kind == config::InjectionKind::intermittent;
       return (by_chance ? lost_at_random_s : expectation.bound_s) + 4.0 * further_speed_windows_s;
     }
     default: return expectation.bound_s * times_slower;
@@ -219,8 +219,8 @@ double allowed_s(const driver::Injection& fault, const Expectation& expectation,
 }
 
 /// Delays of some ms are none where a period takes 10 ms.
-bool no_delay(const driver::Injection& fault, const Conditions& c) {
-  return fault.kind == driver::InjectionKind::slow && c.rate_Hz <= 100.0;
+bool no_delay(const config::Injection& fault, const Conditions& c) {
+  return fault.kind == config::InjectionKind::slow && c.rate_Hz <= 100.0;
 }
 
 }  // namespace
@@ -234,7 +234,7 @@ TEST_CASE("under slow reads and wrong models every run ends safely, in time, and
       const Expectation expectation = expected(Backend::sim, table.faults[row]);
       for (std::size_t n = 0; n < table.columns.size(); ++n) {
         const Outcome& o = table.rows[row][n];
-        CAPTURE(table.title, driver::to_text(table.faults[row]), table.columns[n].name, static_cast<int>(o.reason),
+        CAPTURE(table.title, config::to_text(table.faults[row]), table.columns[n].name, static_cast<int>(o.reason),
                 o.after_s, o.mattered_s);
         CHECK(o.safe);
         if (o.reason == rig::Reason::sequence_complete) {

@@ -8,8 +8,8 @@ namespace abs_hil::experiment::test {
 
 namespace {
 
-using driver::InjectionKind;
-using driver::InjectionSignal;
+using config::InjectionKind;
+using config::InjectionSignal;
 using rig::Phase;
 using rig::Reason;
 
@@ -25,7 +25,7 @@ constexpr double half_motor_s = 20.0;  ///< a motor at half duty still works; ot
 
 bool before(Phase phase, Phase other) { return static_cast<int>(phase) < static_cast<int>(other); }
 
-Expectation encoder(const driver::Injection& injection, Reason stuck, Reason jumped, Reason reversed) {
+Expectation encoder(const config::Injection& injection, Reason stuck, Reason jumped, Reason reversed) {
   // A few turns per second at the end: too slow to detect stuck and reversed before the run ends.
   const bool slow_wheels = !before(*injection.phase, Phase::hold);
   switch (injection.kind) {
@@ -54,7 +54,7 @@ Expectation encoder(const driver::Injection& injection, Reason stuck, Reason jum
   return {{}, true};
 }
 
-Expectation both_encoders(const driver::Injection& injection) {
+Expectation both_encoders(const config::Injection& injection) {
   Expectation expectation =
       encoder(injection, Reason::encoders_lost, Reason::encoder_upper_jumped, Reason::encoder_lower_jumped);
   if (injection.kind == InjectionKind::wrong) {
@@ -115,7 +115,7 @@ Expectation read(InjectionKind kind) {
 }
 
 /// Drive PWM and enable: both have the same effect on the wheels.
-Expectation drive(const driver::Injection& injection) {
+Expectation drive(const config::Injection& injection) {
   const bool driven = before(*injection.phase, Phase::coast);
   switch (injection.kind) {
     case InjectionKind::off: return {{Reason::motor_no_response}, !driven, response_s};
@@ -128,7 +128,7 @@ Expectation drive(const driver::Injection& injection) {
   }
 }
 
-Expectation brake(const driver::Injection& injection) {
+Expectation brake(const config::Injection& injection) {
   const bool late = injection.phase == Phase::hold || injection.phase == Phase::stopped;
   switch (injection.kind) {
     case InjectionKind::off:
@@ -145,7 +145,7 @@ Expectation brake(const driver::Injection& injection) {
   }
 }
 
-Expectation write(Backend backend, const driver::Injection& injection) {
+Expectation write(Backend backend, const config::Injection& injection) {
   const bool late = injection.phase == Phase::hold || injection.phase == Phase::stopped;
   switch (injection.kind) {
     case InjectionKind::off: return {{Reason::driver_write_failed}, false, at_once_s};
@@ -171,7 +171,7 @@ Expectation write(Backend backend, const driver::Injection& injection) {
 /// The measured rig's motor starts through a resistor, with 0.9 N m instead of 2.1: until the wheels are fast enough
 /// for a check takes up to 2.4 times as long, and counts that are lost or late can look like a motor without effect.
 /// With half the friction a brake that holds on locks the wheel later.
-Expectation on_measured(Expectation expectation, const driver::Injection& injection) {
+Expectation on_measured(Expectation expectation, const config::Injection& injection) {
   const bool of_encoders = injection.signal == InjectionSignal::encoder_upper ||
                            injection.signal == InjectionSignal::encoder_lower ||
                            injection.signal == InjectionSignal::encoders;
@@ -184,7 +184,7 @@ Expectation on_measured(Expectation expectation, const driver::Injection& inject
   return expectation;
 }
 
-Expectation expected_of(Backend backend, const driver::Injection& injection) {
+Expectation expected_of(Backend backend, const config::Injection& injection) {
   switch (injection.signal) {
     case InjectionSignal::encoder_upper:
       return encoder(injection, Reason::encoder_upper_stuck, Reason::encoder_upper_jumped,
@@ -208,7 +208,7 @@ Expectation expected_of(Backend backend, const driver::Injection& injection) {
 
 }  // namespace
 
-Expectation expected(Backend backend, const driver::Injection& injection) {
+Expectation expected(Backend backend, const config::Injection& injection) {
   Expectation expectation = expected_of(backend, injection);
   return backend == Backend::measured_step || backend == Backend::measured_relay
              ? on_measured(std::move(expectation), injection)

@@ -4,8 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "driver/injection/injecting_driver.hpp"
 #include "experiment/simulated_run.hpp"
+#include "injection/injecting_driver.hpp"
 #include "kept_files.hpp"
 #include "matrix_rig.hpp"
 #include "runtime/heartbeat.hpp"
@@ -33,11 +33,11 @@ Setup matrix_setup(Backend backend) {
 
 constexpr std::size_t recorder_slots = 2000;  ///< 2 s, as in the program
 
-MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, const std::filesystem::path& folder) {
+MatrixCase run_with(Backend backend, std::vector<config::Injection> injections, const std::filesystem::path& folder) {
   const Setup setup = matrix_setup(backend);
   runtime::VirtualClock clock;
   const std::unique_ptr<MatrixRig> rig = make_matrix_rig(backend, setup);
-  driver::InjectingDriver driver(rig->driver(), std::move(injections), 1, [&clock](std::int64_t duration_ns) {
+  injection::InjectingDriver driver(rig->driver(), std::move(injections), 1, [&clock](std::int64_t duration_ns) {
     clock.sleep_until(clock.now_ns() + duration_ns);
   });
   std::vector<runtime::FlightSlot> slots(recorder_slots);
@@ -77,24 +77,24 @@ std::vector<rig::Phase> phases_of(Backend backend) {
   return {Phase::idle, Phase::accelerate, Phase::coast, Phase::brake, Phase::hold, Phase::stopped};
 }
 
-std::vector<driver::Injection> all_injections(Backend backend) {
-  std::vector<driver::Injection> all;
-  for (std::size_t signal = 0; signal < driver::injection_signal_count; ++signal) {
-    for (std::size_t kind = 0; kind < driver::injection_kind_count; ++kind) {
+std::vector<config::Injection> all_injections(Backend backend) {
+  std::vector<config::Injection> all;
+  for (std::size_t signal = 0; signal < config::injection_signal_count; ++signal) {
+    for (std::size_t kind = 0; kind < config::injection_kind_count; ++kind) {
       for (const Phase phase : phases_of(backend)) {
         // The hold phase lasts some 30 ms.
         const std::string delay = phase == Phase::hold ? "+10ms" : "+100ms";
         all.push_back(
-            driver::parse_injection(std::string(rig::name_of(phase)) + '@' +
-                                    std::string(driver::name_of(static_cast<driver::InjectionSignal>(signal))) + ':' +
-                                    std::string(driver::name_of(static_cast<driver::InjectionKind>(kind))) + delay));
+            config::parse_injection(std::string(rig::name_of(phase)) + '@' +
+                                    std::string(config::name_of(static_cast<config::InjectionSignal>(signal))) + ':' +
+                                    std::string(config::name_of(static_cast<config::InjectionKind>(kind))) + delay));
       }
     }
   }
   return all;
 }
 
-MatrixCase run_case(Backend backend, const driver::Injection& injection, const std::filesystem::path& folder) {
+MatrixCase run_case(Backend backend, const config::Injection& injection, const std::filesystem::path& folder) {
   MatrixCase result = run_with(backend, {injection}, folder);
   result.injection = injection;
   return result;

@@ -9,7 +9,7 @@
 
 #include "abs_hil/rig/reason.hpp"
 #include "analysis/run_metrics.hpp"
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -24,7 +24,7 @@ inline constexpr std::array backends{Backend::sim, Backend::card, Backend::hm2, 
 
 /// One fault in one phase, and its result.
 struct MatrixCase {
-  driver::Injection injection{};
+  config::Injection injection{};
   rig::Reason reason{rig::Reason::none};
   double reaction_s{0.0};  ///< from the first affected reading or command to the safe state
   analysis::Metrics metrics{};
@@ -43,12 +43,12 @@ struct Expectation {
 
 /// Every signal x kind x phase, in this order. On boards, whose emulation takes ten times as long, only the phases of
 /// acceleration and braking.
-[[nodiscard]] std::vector<driver::Injection> all_injections(Backend backend);
+[[nodiscard]] std::vector<config::Injection> all_injections(Backend backend);
 /// @param folder  folder of its files
-[[nodiscard]] MatrixCase run_case(Backend backend, const driver::Injection& injection,
+[[nodiscard]] MatrixCase run_case(Backend backend, const config::Injection& injection,
                                   const std::filesystem::path& folder);
 [[nodiscard]] analysis::Metrics metrics_without_fault(Backend backend, const std::filesystem::path& folder);
-[[nodiscard]] Expectation expected(Backend backend, const driver::Injection& injection);
+[[nodiscard]] Expectation expected(Backend backend, const config::Injection& injection);
 
 [[nodiscard]] std::vector<rig::Phase> phases_of(Backend backend);
 

@@ -22,7 +22,7 @@ namespace {
 Matrix run_all(Backend backend) {
   const abs_hil::test::TemporaryFolder folder;
   Matrix matrix{.nominal_m = metrics_without_fault(backend, folder.path).stop_distance_m};
-  for (const driver::Injection& injection : all_injections(backend)) {
+  for (const config::Injection& injection : all_injections(backend)) {
     matrix.cases.push_back(run_case(backend, injection, folder.path));
   }
   return matrix;
@@ -46,8 +46,8 @@ const Matrix& matrix_of(Backend backend) { return matrices()[static_cast<std::si
 constexpr double longest_degraded = 1.40;
 constexpr double longest_undisturbed = 1.005;
 
-bool touches_braking(const driver::Injection& injection) {
-  using enum driver::InjectionSignal;
+bool touches_braking(const config::Injection& injection) {
+  using enum config::InjectionSignal;
   return injection.signal == encoder_upper || injection.signal == encoder_lower || injection.signal == encoders ||
          injection.signal == stamp || injection.signal == brake_pwm || injection.signal == write;
 }
@@ -58,7 +58,7 @@ TEST_CASE("every fault in every phase ends in the safe state in time, with the r
   const Backend backend = GENERATE(from_range(backends));
   for (const MatrixCase& c : matrix_of(backend).cases) {
     const Expectation expectation = expected(backend, c.injection);
-    CAPTURE(driver::to_text(c.injection), static_cast<int>(backend), static_cast<int>(c.reason), c.reaction_s);
+    CAPTURE(config::to_text(c.injection), static_cast<int>(backend), static_cast<int>(c.reason), c.reaction_s);
     CHECK(c.safe);
     CHECK(c.complete);
     CHECK(c.lost == "");
@@ -75,8 +75,8 @@ TEST_CASE("a run that continues despite a fault stays within the stated degradat
   const Matrix& matrix = matrix_of(GENERATE(from_range(backends)));
   for (const MatrixCase& c : matrix.cases) {
     if (!c.survived()) continue;
-    CAPTURE(driver::to_text(c.injection));
-    const bool none = c.injection.kind == driver::InjectionKind::ok || !touches_braking(c.injection);
+    CAPTURE(config::to_text(c.injection));
+    const bool none = c.injection.kind == config::InjectionKind::ok || !touches_braking(c.injection);
     CHECK(c.metrics.stop_distance_m < matrix.nominal_m * (none ? longest_undisturbed : longest_degraded));
   }
 }

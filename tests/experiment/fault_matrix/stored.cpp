@@ -26,9 +26,9 @@ std::string result(const MatrixCase& c, double nominal_m) {
 std::string rows(const Matrix& matrix, const std::string& backend) {
   std::string text;
   for (const MatrixCase& c : matrix.cases) {
-    if (c.injection.kind == driver::InjectionKind::ok) continue;
+    if (c.injection.kind == config::InjectionKind::ok) continue;
     text.append(backend).append(",").append(rig::name_of(c.injection.phase.value())).append(",");
-    text.append(driver::name_of(c.injection.signal)).append(",").append(driver::name_of(c.injection.kind));
+    text.append(config::name_of(c.injection.signal)).append(",").append(config::name_of(c.injection.kind));
     text += ',' + result(c, matrix.nominal_m) + '\n';
   }
   return text;

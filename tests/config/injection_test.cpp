@@ -1,12 +1,12 @@
 // The text of an injected fault: what is parsed, and what is refused.
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 
 #include <cmath>
 
 #include "catch.hpp"
 
 using namespace abs_hil;
-using namespace abs_hil::driver;
+using namespace abs_hil::config;
 using Catch::Matchers::Contains;
 
 TEST_CASE("an injection's text is parsed") {

@@ -15,12 +15,12 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 #include "rig/encoder_scale.hpp"
 
 // The effect of an injected fault on one signal. All functions except the constructors are real-time safe.
 
-namespace abs_hil::driver {
+namespace abs_hil::injection {
 
 /// A number in [0, 1) from the generator's upper 32 bits: the same with every standard library.
 [[nodiscard]] inline double uniform(std::mt19937_64& random) noexcept {
@@ -29,12 +29,12 @@ namespace abs_hil::driver {
 
 /// The fault that currently acts on a signal.
 struct ActiveFault {
-  InjectionKind kind{InjectionKind::ok};
+  config::InjectionKind kind{config::InjectionKind::ok};
   double parameter{0.0};
-  InjectionSignal signal{};  ///< for which it was given
+  config::InjectionSignal signal{};  ///< for which it was given
   /// True if the encoder shows the other wheel's counts.
   [[nodiscard]] bool swaps() const noexcept {
-    return kind == InjectionKind::wrong && signal == InjectionSignal::encoders;
+    return kind == config::InjectionKind::wrong && signal == config::InjectionSignal::encoders;
   }
 };
 
@@ -96,21 +96,21 @@ class EncoderChannel {
   [[nodiscard]] std::int32_t pass(std::int32_t travel, const ActiveFault& fault, std::int64_t now_ns,
                                   std::mt19937_64& random) noexcept {
     switch (fault.kind) {
-      case InjectionKind::off: delivered_ = 0; break;
-      case InjectionKind::stuck: break;
-      case InjectionKind::garbage:
+      case config::InjectionKind::off: delivered_ = 0; break;
+      case config::InjectionKind::stuck: break;
+      case config::InjectionKind::garbage:
         delivered_ = std::bit_cast<std::int32_t>(static_cast<std::uint32_t>(random() >> 32U));
         break;
-      case InjectionKind::wrong: {
+      case config::InjectionKind::wrong: {
         const double counted = fraction_ + fault.parameter * travel;
         fraction_ = counted - std::trunc(counted);
         advance(static_cast<std::int64_t>(std::trunc(counted)));
         break;
       }
-      case InjectionKind::intermittent:
+      case config::InjectionKind::intermittent:
         if (uniform(random) >= fault.parameter) advance(travel);
         break;
-      case InjectionKind::slow:
+      case config::InjectionKind::slow:
         held_ += travel;
         if (now_ns - renewed_ns_ >= ns_of(fault.parameter)) {
           renewed_ns_ = now_ns;
@@ -118,13 +118,13 @@ class EncoderChannel {
           held_ = 0;
         }
         break;
-      case InjectionKind::delayed: {
+      case config::InjectionKind::delayed: {
         line_.push(now_ns, travel);
         std::int64_t late = 0;
         while (line_.pop(now_ns - ns_of(fault.parameter), late)) advance(late);
         break;
       }
-      case InjectionKind::ok:
+      case config::InjectionKind::ok:
         advance(travel + held_);
         held_ = 0;
         for (std::int64_t late = 0; line_.pop(now_ns, late);) advance(late);
@@ -170,33 +170,33 @@ class NumberChannel {
   }
   [[nodiscard]] double pass(double value, const ActiveFault& fault, std::int64_t now_ns,
                             std::mt19937_64& random) noexcept {
-    if (fault.kind != InjectionKind::delayed) line_.clear();
+    if (fault.kind != config::InjectionKind::delayed) line_.clear();
     switch (fault.kind) {
-      case InjectionKind::ok:
+      case config::InjectionKind::ok:
         delivered_ = value;
         renewed_ns_ = now_ns;
         break;
-      case InjectionKind::off: delivered_ = faults_.off; break;
-      case InjectionKind::stuck: break;
-      case InjectionKind::garbage: {
+      case config::InjectionKind::off: delivered_ = faults_.off; break;
+      case config::InjectionKind::stuck: break;
+      case config::InjectionKind::garbage: {
         const double drawn = faults_.garbage_least + (faults_.garbage_most - faults_.garbage_least) * uniform(random);
         delivered_ = faults_.whole ? std::floor(drawn) : drawn;
         break;
       }
-      case InjectionKind::wrong: delivered_ = faults_.wrong(value, fault.parameter); break;
-      case InjectionKind::intermittent: {
+      case config::InjectionKind::wrong: delivered_ = faults_.wrong(value, fault.parameter); break;
+      case config::InjectionKind::intermittent: {
         const bool fails = uniform(random) < fault.parameter;
         const double failed = faults_.intermittently_wrong ? faults_.wrong(value, 0.0) : faults_.off;
         delivered_ = fails ? failed : value;
         break;
       }
-      case InjectionKind::slow:
+      case config::InjectionKind::slow:
         if (now_ns - renewed_ns_ >= ns_of(fault.parameter)) {
           renewed_ns_ = now_ns;
           delivered_ = value;
         }
         break;
-      case InjectionKind::delayed:
+      case config::InjectionKind::delayed:
         line_.push(now_ns, value);
         while (line_.pop(now_ns - ns_of(fault.parameter), delivered_)) {
         }
@@ -216,13 +216,13 @@ class NumberChannel {
 /// run. No fault affects making safe (`deactivate`, and after a failed write): guardian and E-stop are there for the
 /// case that no command reaches the board. A fault of the outputs lies behind the board's registers, where no driver
 /// sees it: `write` tells the command that would have gone out without it. As real-time safe as the backend.
-class InjectingDriver final : public RigDriver {
+class InjectingDriver final : public driver::RigDriver {
  public:
   /// Lets this time pass in the calling thread, ns; used for slow calls.
   using PassTime = std::function<void(std::int64_t duration_ns)>;
   /// @param pass_time may be empty; then slow calls take no time
-  InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections, std::uint64_t seed,
-                  PassTime pass_time);
+  InjectingDriver(std::unique_ptr<driver::RigDriver> inner, const std::vector<config::Injection>& injections,
+                  std::uint64_t seed, PassTime pass_time);
   ~InjectingDriver() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return inner_->name(); }
@@ -231,8 +231,8 @@ class InjectingDriver final : public RigDriver {
   }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override { return inner_->truth(); }
   [[nodiscard]] std::vector<std::string> notes() const override;
-  [[nodiscard]] IoResult try_write() noexcept override { return inner_->try_write(); }
-  [[nodiscard]] BoardIdentity identity() const override { return inner_->identity(); }
+  [[nodiscard]] driver::IoResult try_write() noexcept override { return inner_->try_write(); }
+  [[nodiscard]] driver::BoardIdentity identity() const override { return inner_->identity(); }
   [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return inner_->outputs_now(applied); }
   [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::optional<AnswerTimes> answer_times() const override { return inner_->answer_times(); }
@@ -244,34 +244,34 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override { return inner_->what_holds_unsafe(); }
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }
   [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return inner_->make_safe_bound_ns(); }
-  void tell_before_making_safe(MakingSafeListener* listener) noexcept override {
+  void tell_before_making_safe(driver::MakingSafeListener* listener) noexcept override {
     inner_->tell_before_making_safe(listener);
   }
   void note_phase(rig::Phase phase) noexcept override;
   void note_wheels_apart(bool apart) noexcept override { inner_->note_wheels_apart(apart); }
-  [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }
+  [[nodiscard]] const driver::RigDriver& inner() const noexcept { return *inner_; }
   /// Time of the first read or write that a fault changed; -1 before that.
   [[nodiscard]] std::int64_t first_effect_ns() const noexcept { return first_effect_ns_; }
 
  private:
   struct Planned {
-    Injection injection{};
+    config::Injection injection{};
     std::int64_t entered_ns{-1};  ///< when the run first entered its phase; < 0: not yet
   };
 
   void do_configure() override { inner_->configure(); }
   void do_activate(std::int64_t now_ns) override;
-  IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
-  IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
-  IoResult do_rest() noexcept override { return inner_->rest(); }
+  driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
+  driver::IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
+  driver::IoResult do_rest() noexcept override { return inner_->rest(); }
 
-  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept { return fault_of(signal, signal); }
+  [[nodiscard]] ActiveFault fault_of(config::InjectionSignal signal) const noexcept { return fault_of(signal, signal); }
   /// Of faults given for either signal.
-  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal, InjectionSignal or_of) const noexcept;
+  [[nodiscard]] ActiveFault fault_of(config::InjectionSignal signal, config::InjectionSignal or_of) const noexcept;
   void note_effect(bool differs) noexcept;
   /// What the fault of `signal` makes of a value.
-  [[nodiscard]] double pass(std::size_t number, InjectionSignal signal, double value) noexcept {
+  [[nodiscard]] double pass(std::size_t number, config::InjectionSignal signal, double value) noexcept {
     return numbers_[number].pass(value, fault_of(signal), now_ns_, random_);
   }
   void fail_encoders(rig::Measurement& measurement) noexcept;
@@ -279,10 +279,10 @@ class InjectingDriver final : public RigDriver {
   /// A fault of a whole answer or command. `last` is the one before, `garble` makes random values of this one, `spoil`
   /// makes it wrong by a factor.
   template <class Value, class Garble, class Spoil>
-  IoResult fail_whole(InjectionSignal signal, Value& value, const Value& last, DelayLine<Value>& line, Garble garble,
-                      Spoil spoil) noexcept;
+  driver::IoResult fail_whole(config::InjectionSignal signal, Value& value, const Value& last, DelayLine<Value>& line,
+                              Garble garble, Spoil spoil) noexcept;
 
-  std::unique_ptr<RigDriver> inner_;
+  std::unique_ptr<driver::RigDriver> inner_;
   std::vector<Planned> planned_;
   std::uint64_t seed_;
   PassTime pass_time_;
@@ -300,4 +300,7 @@ class InjectingDriver final : public RigDriver {
   std::array<NumberChannel, 8> numbers_;  ///< by the numbers' place in the table of their faults
 };
 
-}  // namespace abs_hil::driver
+/// Lets runs inject faults by this driver (run::inject_by).
+void begin();
+
+}  // namespace abs_hil::injection

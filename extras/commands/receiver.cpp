@@ -1,6 +1,6 @@
 // Receives what other programs publish over LCM, and finds a tcpq server again that restarts; one channel of LCM's UDP
 // multicast without liblcm, whole messages only.
-#include "telemetry/receiver.hpp"
+#include "commands/receiver.hpp"
 
 #include <arpa/inet.h>
 #include <poll.h>
@@ -18,7 +18,7 @@
 #include "rig/formatted_text.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
-namespace abs_hil::telemetry {
+namespace abs_hil::commands {
 namespace {
 
 /// LCM's queue holds 30 messages by default, which is 30 ms of telemetry.
@@ -27,7 +27,7 @@ constexpr std::chrono::seconds look_period{1};
 constexpr int look_timeout_ms = 100;
 
 std::string well_formed(std::string url) {
-  if (!url.empty()) static_cast<void>(parse_lcm_url(url));  // wrong input, not a missing network
+  if (!url.empty()) static_cast<void>(telemetry::parse_lcm_url(url));  // wrong input, not a missing network
   return url;
 }
 
@@ -59,7 +59,7 @@ int number_in(std::string_view options, std::string_view name) {
 
 /// True if this computer has the address: only then a socket can be bound to it. Makes system calls, allocates nothing.
 bool is_own_address(const in_addr& address) noexcept {
-  const Socket socket(SOCK_DGRAM);
+  const telemetry::Socket socket(SOCK_DGRAM);
   sockaddr_in own{};
   own.sin_family = AF_INET;
   own.sin_addr = address;
@@ -96,7 +96,7 @@ Receiver::Receiver(std::string url, std::string channels, Take take)
   subscribe();
 }
 
-Receiver::Receiver(LcmOutlet& network, std::string channels, Take take)
+Receiver::Receiver(telemetry::LcmOutlet& network, std::string channels, Take take)
     : network_(network), channels_(std::move(channels)), take_(std::move(take)) {
   subscribe();
 }
@@ -109,7 +109,7 @@ Receiver::~Receiver() {
 void Receiver::subscribe() {
   subscription_ = lcm_subscribe(network_.lcm().getUnderlyingLCM(), channels_.c_str(), &on_packet, this);
   if (subscription_ == nullptr) {
-    throw LcmError("LCM cannot subscribe to the channels \"" + channels_ + "\" at '" + network_.url() + "'");
+    throw telemetry::LcmError("LCM cannot subscribe to the channels \"" + channels_ + "\" at '" + network_.url() + "'");
   }
   lcm_subscription_set_queue_capacity(subscription_, queue_messages);
 }
@@ -118,7 +118,9 @@ void Receiver::look_for_server() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_look_) return;
   next_look_ = now + look_period;
-  if (ask_tcpq_server(endpoint_of(parse_lcm_url(network_.url())), look_timeout_ms) != TcpqServer::answers) return;
+  if (ask_tcpq_server(endpoint_of(telemetry::parse_lcm_url(network_.url())), look_timeout_ms) !=
+      telemetry::TcpqServer::answers)
+    return;
   // This connects again. lcm_handle would connect too, but then wait for a message without limit.
   lcm_unsubscribe(network_.lcm().getUnderlyingLCM(), subscription_);
   subscribe();
@@ -162,14 +164,14 @@ LcmPacket look_at(std::span<const std::uint8_t> datagram, std::string_view chann
 
 UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channel_(std::move(channel)) {
   const int why_no_socket = errno;
-  const LcmUrl parts = parse_lcm_url(url);
+  const telemetry::LcmUrl parts = telemetry::parse_lcm_url(url);
   own_computer_only_ = number_in(parts.options, "ttl=") == 0;
-  const Endpoint endpoint = endpoint_of(parts);
-  const auto group = socket_address_of(endpoint);
+  const telemetry::Endpoint endpoint = endpoint_of(parts);
+  const auto group = telemetry::socket_address_of(endpoint);
   if (group && join(socket_.get(), *group, number_in(parts.options, "recv_buf_size="))) return;
   const int problem = !group ? EINVAL : socket_.get() < 0 ? why_no_socket : errno;
-  throw LcmError("commands cannot be received at " + endpoint.address + ":" + std::to_string(endpoint.port) + ": " +
-                 rig::refusal(problem, endpoint.address, rig::reaching));
+  throw telemetry::LcmError("commands cannot be received at " + endpoint.address + ":" + std::to_string(endpoint.port) +
+                            ": " + rig::refusal(problem, endpoint.address, rig::reaching));
 }
 
 bool UdpmReceiver::is_from_here(const in_addr& sender) noexcept {
@@ -209,4 +211,4 @@ UdpmReceiver::Arrival UdpmReceiver::next() noexcept {
   return {};
 }
 
-}  // namespace abs_hil::telemetry
+}  // namespace abs_hil::commands

@@ -1,12 +1,12 @@
 // URIs of files by RFC 3986 and RFC 8089: made, read, and read as Windows reads them.
-#include "rig/file_uri.hpp"
+#include "interchange/file_uri.hpp"
 
 #include <string>
 
 #include "catch.hpp"
 
-using abs_hil::rig::file_uri;
-using abs_hil::rig::path_of_uri;
+using abs_hil::interchange::file_uri;
+using abs_hil::interchange::path_of_uri;
 
 TEST_CASE("every byte of a path survives the way through its URI") {
   std::string all = "/";

@@ -14,7 +14,7 @@
 
 #include "telemetry/lcm_outlet.hpp"
 
-namespace abs_hil::telemetry {
+namespace abs_hil::commands {
 
 /// Receives what other programs publish, undecoded. Publishers may start, stop and restart, and so may a tcpq server.
 class Receiver {
@@ -26,7 +26,7 @@ class Receiver {
   /// std::bad_alloc only; poll() throws it again.
   Receiver(std::string url, std::string channels, Take take);
   /// The same on a network that outlives it. memq delivers within one object only.
-  Receiver(LcmOutlet& network, std::string channels, Take take);
+  Receiver(telemetry::LcmOutlet& network, std::string channels, Take take);
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
   ~Receiver();
@@ -44,8 +44,8 @@ class Receiver {
   /// Connects tcpq again, at most once a second.
   void look_for_server();
 
-  std::optional<LcmOutlet> own_{};
-  LcmOutlet& network_;
+  std::optional<telemetry::LcmOutlet> own_{};
+  telemetry::LcmOutlet& network_;
   std::string channels_;
   Take take_;
   std::chrono::steady_clock::time_point next_look_{};
@@ -104,7 +104,7 @@ class UdpmReceiver {
  private:
   [[nodiscard]] bool is_from_here(const in_addr& sender) noexcept;
 
-  Socket socket_{SOCK_DGRAM | SOCK_NONBLOCK};
+  telemetry::Socket socket_{SOCK_DGRAM | SOCK_NONBLOCK};
   bool own_computer_only_{true};
   in_addr_t known_own_address_{0};  ///< of the last sender on this computer; 0: none yet
   std::string channel_;
@@ -113,4 +113,4 @@ class UdpmReceiver {
   std::uint32_t dropped_seen_{0};  ///< the kernel's own counter, which wraps
 };
 
-}  // namespace abs_hil::telemetry
+}  // namespace abs_hil::commands

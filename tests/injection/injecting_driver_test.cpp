@@ -1,5 +1,5 @@
 // Injected faults, cycle by cycle: what each does to readings and commands, and when.
-#include "driver/injection/injecting_driver.hpp"
+#include "injection/injecting_driver.hpp"
 
 #include <cmath>
 
@@ -7,7 +7,9 @@
 #include "rig/encoder_scale.hpp"
 
 using namespace abs_hil;
+using namespace abs_hil::config;
 using namespace abs_hil::driver;
+using namespace abs_hil::injection;
 
 namespace {
 

@@ -1,5 +1,5 @@
 // Reads the text of injected faults.
-#include "driver/injection/injection.hpp"
+#include "config/injection.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include "rig/formatted_text.hpp"
 
-namespace abs_hil::driver {
+namespace abs_hil::config {
 
 namespace {
 
@@ -37,16 +37,16 @@ std::string listed(std::span<const std::string_view> names) {
                               "brake@encoder_upper:stuck+0.2s");
 }
 
-bool is_number(std::string_view text, double& value) {
+bool reads_number(std::string_view text, double& value) {
   const auto number = rig::parse_number<double>(text);
   value = number.value_or(value);
   return number && std::isfinite(*number);
 }
 
 /// Parses "0.2s" or "200ms".
-bool is_time(std::string_view text, double& seconds) {
+bool reads_time(std::string_view text, double& seconds) {
   const bool milli = text.ends_with("ms");
-  if (!text.ends_with('s') || !is_number(text.substr(0, text.size() - (milli ? 2 : 1)), seconds)) return false;
+  if (!text.ends_with('s') || !reads_number(text.substr(0, text.size() - (milli ? 2 : 1)), seconds)) return false;
   if (milli) seconds *= 1e-3;
   return true;
 }
@@ -80,7 +80,7 @@ Parameter parameter_of(InjectionSignal signal, InjectionKind kind) {
   }
 }
 
-std::size_t place_of(std::string_view text, std::string_view part, std::span<const std::string_view> names,
+std::size_t place_in(std::string_view text, std::string_view part, std::span<const std::string_view> names,
                      const char* what) {
   const auto found = std::ranges::find(names, part);
   if (found == names.end()) refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
@@ -103,7 +103,7 @@ void read_parameter(std::string_view text, const std::optional<std::string_view>
   const std::string what = std::string(name_of(injection.signal)) + ':' + std::string(name_of(injection.kind));
   if (wanted.unit == Parameter::Unit::none) refuse(text, *given, what + " takes no parameter");
   const bool time = wanted.unit == Parameter::Unit::time;
-  const bool known = time ? is_time(*given, injection.parameter) : is_number(*given, injection.parameter);
+  const bool known = time ? reads_time(*given, injection.parameter) : reads_number(*given, injection.parameter);
   if (!known || injection.parameter < wanted.least || injection.parameter > wanted.most) {
     refuse(text, *given,
            what + rig::formatted(" takes a %s in [%g, %g]%s", time ? "time" : "number", wanted.least, wanted.most,
@@ -120,12 +120,12 @@ Injection parse_injection(std::string_view text) {
   Injection injection;
   std::string_view rest = text;
   if (const auto duration = cut(rest, '~')) {
-    if (!is_time(*duration, injection.duration_s) || injection.duration_s <= 0.0) {
+    if (!reads_time(*duration, injection.duration_s) || injection.duration_s <= 0.0) {
       refuse(text, *duration, "not a duration above 0, as 0.5s or 500ms");
     }
   }
   if (const auto delay = cut(rest, '+')) {
-    if (!is_time(*delay, injection.delay_s) || injection.delay_s < 0.0 || injection.delay_s > longest_delay_s) {
+    if (!reads_time(*delay, injection.delay_s) || injection.delay_s < 0.0 || injection.delay_s > longest_delay_s) {
       refuse(text, *delay, "not a delay in [0, 600] s, as 0.2s or 200ms");
     }
   }
@@ -134,10 +134,10 @@ Injection parse_injection(std::string_view text) {
   if (!kind) refuse(text, rest, "no \":KIND\"; known: " + listed(kinds));
   const auto signal = cut(rest, '@');
   if (!signal) refuse(text, rest, "no \"PHASE@\" before the signal");
-  const std::size_t phase = place_of(text, rest, phases, "phase");
+  const std::size_t phase = place_in(text, rest, phases, "phase");
   if (phases[phase] != any_phase) injection.phase = static_cast<rig::Phase>(phase);
-  injection.signal = static_cast<InjectionSignal>(place_of(text, *signal, signals, "signal"));
-  injection.kind = static_cast<InjectionKind>(place_of(text, *kind, kinds, "kind"));
+  injection.signal = static_cast<InjectionSignal>(place_in(text, *signal, signals, "signal"));
+  injection.kind = static_cast<InjectionKind>(place_in(text, *kind, kinds, "kind"));
   read_parameter(text, parameter, injection);
   return injection;
 }
@@ -166,4 +166,4 @@ std::string to_text(const Injection& injection) {
   return text;
 }
 
-}  // namespace abs_hil::driver
+}  // namespace abs_hil::config

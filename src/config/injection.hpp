@@ -10,7 +10,7 @@
 #include "abs_hil/rig/phase.hpp"
 
 // Faults injected between the executive and any backend except real hardware (docs/fault-injection.md).
-namespace abs_hil::driver {
+namespace abs_hil::config {
 
 /// Where a fault acts: on a part of the measurement, a part of the command, or a whole call.
 enum class InjectionSignal : std::uint8_t {
@@ -59,4 +59,4 @@ struct Injection {
 [[nodiscard]] std::string_view name_of(InjectionSignal signal) noexcept;
 [[nodiscard]] std::string_view name_of(InjectionKind kind) noexcept;
 
-}  // namespace abs_hil::driver
+}  // namespace abs_hil::config

@@ -1,12 +1,14 @@
 // Applies due faults to each call of the driver behind it.
-#include "driver/injection/injecting_driver.hpp"
+#include "injection/injecting_driver.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <limits>
 #include <utility>
 
-namespace abs_hil::driver {
+#include "run/run.hpp"
+
+namespace abs_hil::injection {
 
 namespace {
 
@@ -46,19 +48,20 @@ std::int32_t any_counts(std::mt19937_64& random) noexcept {
 
 }  // namespace
 
-InjectingDriver::InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections,
-                                 std::uint64_t seed, PassTime pass_time)
+InjectingDriver::InjectingDriver(std::unique_ptr<driver::RigDriver> inner,
+                                 const std::vector<config::Injection>& injections, std::uint64_t seed,
+                                 PassTime pass_time)
     : inner_(std::move(inner)),
       seed_(seed),
       pass_time_(std::move(pass_time)),
       numbers_{number_faults[stamp], number_faults[supply], number_faults[temperature],  number_faults[trip],
                number_faults[motor], number_faults[brake],  number_faults[brake_torque], number_faults[enable]} {
-  for (const Injection& injection : injections) planned_.push_back({injection});
+  for (const config::Injection& injection : injections) planned_.push_back({injection});
 }
 
 std::vector<std::string> InjectingDriver::notes() const {
   std::vector<std::string> notes = inner_->notes();
-  for (const Planned& planned : planned_) notes.push_back("FAULT INJECTED: " + to_text(planned.injection));
+  for (const Planned& planned : planned_) notes.push_back("FAULT INJECTED: " + config::to_text(planned.injection));
   return notes;
 }
 
@@ -66,7 +69,8 @@ std::vector<std::string> InjectingDriver::tally() const {
   std::vector<std::string> lines = inner_->tally();
   for (const Planned& planned : planned_) {
     const bool began = planned.entered_ns >= 0 && now_ns_ >= planned.entered_ns + ns_of(planned.injection.delay_s);
-    if (!began) lines.push_back("the injected fault " + to_text(planned.injection) + " never began: the run was over");
+    if (!began)
+      lines.push_back("the injected fault " + config::to_text(planned.injection) + " never began: the run was over");
   }
   return lines;
 }
@@ -95,12 +99,12 @@ void InjectingDriver::note_effect(bool differs) noexcept {
   if (differs && first_effect_ns_ < 0) first_effect_ns_ = now_ns_;
 }
 
-ActiveFault InjectingDriver::fault_of(InjectionSignal signal, InjectionSignal or_of) const noexcept {
+ActiveFault InjectingDriver::fault_of(config::InjectionSignal signal, config::InjectionSignal or_of) const noexcept {
   // The fault that began last acts. The kind `ok` ends earlier faults.
   std::int64_t latest_ns = -1;
   ActiveFault fault{};
   for (const Planned& planned : planned_) {
-    const InjectionSignal given = planned.injection.signal;
+    const config::InjectionSignal given = planned.injection.signal;
     if ((given != signal && given != or_of) || planned.entered_ns < 0) continue;
     const std::int64_t begins_ns = planned.entered_ns + ns_of(planned.injection.delay_s);
     const bool over = now_ns_ - begins_ns >= ns_of(std::min(planned.injection.duration_s, longest_run_s));
@@ -112,37 +116,37 @@ ActiveFault InjectingDriver::fault_of(InjectionSignal signal, InjectionSignal or
 }
 
 template <class Value, class Garble, class Spoil>
-IoResult InjectingDriver::fail_whole(InjectionSignal signal, Value& value, const Value& last, DelayLine<Value>& line,
-                                     Garble garble, Spoil spoil) noexcept {
+driver::IoResult InjectingDriver::fail_whole(config::InjectionSignal signal, Value& value, const Value& last,
+                                             DelayLine<Value>& line, Garble garble, Spoil spoil) noexcept {
   const ActiveFault fault = fault_of(signal);
-  if (fault.kind != InjectionKind::delayed) line.clear();
+  if (fault.kind != config::InjectionKind::delayed) line.clear();
   switch (fault.kind) {
-    case InjectionKind::ok: break;
-    case InjectionKind::off: return {IoError::no_answer};
-    case InjectionKind::stuck: value = last; break;
-    case InjectionKind::garbage: garble(); break;
-    case InjectionKind::wrong: return spoil(fault.parameter);
-    case InjectionKind::slow:
+    case config::InjectionKind::ok: break;
+    case config::InjectionKind::off: return {driver::IoError::no_answer};
+    case config::InjectionKind::stuck: value = last; break;
+    case config::InjectionKind::garbage: garble(); break;
+    case config::InjectionKind::wrong: return spoil(fault.parameter);
+    case config::InjectionKind::slow:
       if (pass_time_) pass_time_(ns_of(fault.parameter));
       break;
-    case InjectionKind::delayed: {
+    case config::InjectionKind::delayed: {
       line.push(now_ns_, value);
       value = last;
       while (line.pop(now_ns_ - ns_of(fault.parameter), value)) {
       }
       break;
     }
-    case InjectionKind::intermittent:
-      if (uniform(random_) < fault.parameter) return {IoError::no_answer};
+    case config::InjectionKind::intermittent:
+      if (uniform(random_) < fault.parameter) return {driver::IoError::no_answer};
       break;
   }
   return {};
 }
 
-IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+driver::IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   now_ns_ = now_ns;
   // Always read the backend, also under a fault: the read advances an emulator's time.
-  if (const IoResult result = inner_->read(now_ns, measurement); !result.ok()) return result;
+  if (const driver::IoResult result = inner_->read(now_ns, measurement); !result.ok()) return result;
   if (std::exchange(first_read_, false)) {
     upper_.start(measurement.upper_counts);
     lower_.start(measurement.lower_counts);
@@ -160,17 +164,18 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
     measurement.upper_edge_age_ns = any_counts(random_);
     measurement.lower_edge_age_ns = any_counts(random_);
   };
-  const IoResult result = fail_whole(InjectionSignal::read, measurement, delivered_, answers_, garble,
-                                     [](double) { return IoResult{IoError::implausible_answer}; });
+  const driver::IoResult result =
+      fail_whole(config::InjectionSignal::read, measurement, delivered_, answers_, garble,
+                 [](double) { return driver::IoResult{driver::IoError::implausible_answer}; });
   note_effect(!result.ok() || differ(sound, measurement) ||
-              fault_of(InjectionSignal::read).kind == InjectionKind::slow);
+              fault_of(config::InjectionSignal::read).kind == config::InjectionKind::slow);
   if (result.ok()) delivered_ = measurement;
   return result;
 }
 
 void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
-  ActiveFault upper = fault_of(InjectionSignal::encoder_upper, InjectionSignal::encoders);
-  ActiveFault lower = fault_of(InjectionSignal::encoder_lower, InjectionSignal::encoders);
+  ActiveFault upper = fault_of(config::InjectionSignal::encoder_upper, config::InjectionSignal::encoders);
+  ActiveFault lower = fault_of(config::InjectionSignal::encoder_lower, config::InjectionSignal::encoders);
   const rig::Measurement before = delivered_;
   const rig::Measurement sound = measurement;
   const std::int32_t of_upper = upper_.travel(measurement.upper_counts);
@@ -192,8 +197,8 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
   measurement.upper_counts = upper_.pass(upper_travel, upper, now_ns_, random_);
   measurement.lower_counts = lower_.pass(lower_travel, lower, now_ns_, random_);
   // A faulty encoder's edges come at other times, which nobody stamps.
-  if (upper.kind != InjectionKind::ok) measurement.upper_edge_age_ns = rig::no_edge_age;
-  if (lower.kind != InjectionKind::ok) measurement.lower_edge_age_ns = rig::no_edge_age;
+  if (upper.kind != config::InjectionKind::ok) measurement.upper_edge_age_ns = rig::no_edge_age;
+  if (lower.kind != config::InjectionKind::ok) measurement.lower_edge_age_ns = rig::no_edge_age;
   if (!measurement.ideal_speeds) return;
   // The true speed holds only for a sound encoder. For a faulty one it is scaled by the counts that are delivered.
   const double dt_s = static_cast<double>(measurement.time_ns - before.time_ns) * 1e-9;
@@ -201,11 +206,11 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
     const double shown = rig::counts_between(from, to);
     return travelled != 0 && dt_s > 0.0 ? true_rad_s * shown / travelled : (shown == 0.0 ? 0.0 : true_rad_s);
   };
-  if (upper.kind != InjectionKind::ok) {
+  if (upper.kind != config::InjectionKind::ok) {
     measurement.ideal_speeds->omega1_rad_s =
         speed(before.upper_counts, measurement.upper_counts, upper_travel, measurement.ideal_speeds->omega1_rad_s);
   }
-  if (lower.kind != InjectionKind::ok) {
+  if (lower.kind != config::InjectionKind::ok) {
     measurement.ideal_speeds->omega2_rad_s =
         speed(before.lower_counts, measurement.lower_counts, lower_travel, measurement.ideal_speeds->omega2_rad_s);
   }
@@ -214,13 +219,14 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
 void InjectingDriver::fail_numbers(rig::Measurement& measurement) noexcept {
   // A double holds whole ns for 104 days.
   measurement.time_ns =
-      static_cast<std::int64_t>(pass(stamp, InjectionSignal::stamp, static_cast<double>(measurement.time_ns)));
-  measurement.supply_V = pass(supply, InjectionSignal::supply, measurement.supply_V);
-  measurement.temperature_C = pass(temperature, InjectionSignal::temperature, measurement.temperature_C);
-  measurement.trip_flags = static_cast<std::uint32_t>(pass(trip, InjectionSignal::trip, measurement.trip_flags));
+      static_cast<std::int64_t>(pass(stamp, config::InjectionSignal::stamp, static_cast<double>(measurement.time_ns)));
+  measurement.supply_V = pass(supply, config::InjectionSignal::supply, measurement.supply_V);
+  measurement.temperature_C = pass(temperature, config::InjectionSignal::temperature, measurement.temperature_C);
+  measurement.trip_flags =
+      static_cast<std::uint32_t>(pass(trip, config::InjectionSignal::trip, measurement.trip_flags));
 }
 
-IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
+driver::IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   rig::Command passed = command;
   const auto garble = [&] {
     passed.motor_duty = uniform(random_);
@@ -232,23 +238,34 @@ IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& se
     passed.motor_duty = scaled_duty(passed.motor_duty, factor);
     passed.brake_duty = scaled_duty(passed.brake_duty, factor);
     passed.brake_torque_Nm *= factor;
-    return IoResult{};
+    return driver::IoResult{};
   };
-  if (const IoResult lost = fail_whole(InjectionSignal::write, passed, passed_, commands_, garble, spoil); !lost.ok()) {
+  if (const driver::IoResult lost =
+          fail_whole(config::InjectionSignal::write, passed, passed_, commands_, garble, spoil);
+      !lost.ok()) {
     note_effect(true);
     return lost;
   }
-  passed.motor_duty = pass(motor, InjectionSignal::motor_pwm, passed.motor_duty);
-  passed.brake_duty = pass(brake, InjectionSignal::brake_pwm, passed.brake_duty);
-  passed.brake_torque_Nm = pass(brake_torque, InjectionSignal::brake_pwm, passed.brake_torque_Nm);
-  passed.motor_enable = pass(enable, InjectionSignal::enable, passed.motor_enable ? 1.0 : 0.0) > 0.5;
+  passed.motor_duty = pass(motor, config::InjectionSignal::motor_pwm, passed.motor_duty);
+  passed.brake_duty = pass(brake, config::InjectionSignal::brake_pwm, passed.brake_duty);
+  passed.brake_torque_Nm = pass(brake_torque, config::InjectionSignal::brake_pwm, passed.brake_torque_Nm);
+  passed.motor_enable = pass(enable, config::InjectionSignal::enable, passed.motor_enable ? 1.0 : 0.0) > 0.5;
   const bool changed = passed.motor_duty != command.motor_duty || passed.brake_duty != command.brake_duty ||
                        passed.brake_torque_Nm != command.brake_torque_Nm || passed.motor_enable != command.motor_enable;
-  note_effect(changed || fault_of(InjectionSignal::write).kind == InjectionKind::slow);
+  note_effect(changed || fault_of(config::InjectionSignal::write).kind == config::InjectionKind::slow);
   passed_ = passed;
-  const IoResult result = inner_->write(passed, sent);
+  const driver::IoResult result = inner_->write(passed, sent);
   if (result.ok() && changed) sent = inner_->as_sent(command);
   return result;
 }
 
-}  // namespace abs_hil::driver
+void begin() {
+  run::inject_by([](std::unique_ptr<driver::RigDriver> inner, const std::vector<config::Injection>& faults,
+                    std::uint64_t seed, runtime::Clock& clock) -> std::unique_ptr<driver::RigDriver> {
+    return std::make_unique<InjectingDriver>(std::move(inner), faults, seed, [&clock](std::int64_t duration_ns) {
+      clock.sleep_until(clock.now_ns() + duration_ns);
+    });
+  });
+}
+
+}  // namespace abs_hil::injection

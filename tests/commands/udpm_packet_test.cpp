@@ -3,9 +3,9 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "telemetry/receiver.hpp"
+#include "commands/receiver.hpp"
 
-namespace abs_hil::telemetry {
+namespace abs_hil::commands {
 namespace {
 
 using Kind = LcmPacket::Kind;
@@ -66,4 +66,4 @@ TEST_CASE("packets that are cut anywhere or are not LCM have no channel") {
 }
 
 }  // namespace
-}  // namespace abs_hil::telemetry
+}  // namespace abs_hil::commands

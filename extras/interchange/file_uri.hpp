@@ -8,7 +8,7 @@
 
 #include "rig/formatted_text.hpp"
 
-namespace abs_hil::rig {
+namespace abs_hil::interchange {
 
 #ifdef _WIN32
 inline constexpr bool on_windows = true;
@@ -22,7 +22,7 @@ inline constexpr bool on_windows = false;
   constexpr std::string_view plain = "-._~/0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
   std::string uri = "file://";
   for (const char c : path)
-    uri += plain.find(c) != plain.npos ? std::string(1, c) : formatted("%%%02X", static_cast<unsigned char>(c));
+    uri += plain.find(c) != plain.npos ? std::string(1, c) : rig::formatted("%%%02X", static_cast<unsigned char>(c));
   return uri;
 }
 
@@ -42,7 +42,7 @@ inline constexpr bool on_windows = false;
   if (own && rest.starts_with("//")) rest.remove_prefix(2 + host.size());
   std::string path;
   for (std::size_t n = 0; n < rest.size(); ++n) {
-    const auto code = parse_number<unsigned>(rest.substr(n + 1, 2), 16);
+    const auto code = rig::parse_number<unsigned>(rest.substr(n + 1, 2), 16);
     const bool escape = rest[n] == '%' && n + 2 < rest.size() && code;
     if (escape && *code == 0) throw std::invalid_argument(std::string(uri) + " holds a zero byte");
     path += escape ? static_cast<char>(*code) : rest[n];
@@ -52,4 +52,4 @@ inline constexpr bool on_windows = false;
   return drive ? path[1] + (':' + path.substr(3)) : path;
 }
 
-}  // namespace abs_hil::rig
+}  // namespace abs_hil::interchange
