@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <span>
@@ -275,6 +276,15 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
           .faults = counts.faults,
           .refused = counts.refused,
           .damaged = std::move(damaged)};
+}
+
+Tally run(const std::string& file, const std::string& folder, const StudyOptions& options, const Progress& progress) {
+  const Study study = make_study(load_study(file));
+  const std::string name = options.name.empty() ? std::filesystem::path(file).stem().string() : options.name;
+  const StudyFolder results(folder, facts_of(study, name));
+  const Tally tally = compute(study, results, options.shard, options.threads, progress);
+  if (options.shard.of == 1) results.merge({});
+  return tally;
 }
 
 }  // namespace abs_hil::study

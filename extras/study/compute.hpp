@@ -96,6 +96,18 @@ struct Tally {
 /// after each run, and once before the first.
 using Progress = std::function<void(std::uint64_t done, std::uint64_t all)>;
 
+/// What of a study its file does not say.
+struct StudyOptions {
+  Shard shard{};
+  std::size_t threads{0};  ///< 0: one for each processor
+  std::string name{};      ///< in the results; empty: the name of the file without its ending
+};
+
+/// A study as `abs_hil study FILE --out FOLDER`: computes what the folder lacks of the shard, and puts the results
+/// together unless others compute the other shards. The one entry of program and Python. Throws config::ConfigError
+/// for a study that cannot be used, std::runtime_error if a file cannot be written, and what `progress` throws.
+Tally run(const std::string& file, const std::string& folder, const StudyOptions& options, const Progress& progress);
+
 /// Computes the chunks of a shard that the folder lacks, and writes each as soon as it is finished. The bytes do not
 /// depend on the threads. Memory does not grow with the number of chunks.
 /// @param threads  0: one for each processor

@@ -60,8 +60,6 @@ std::string duration_text(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600.0);
 }
 
-std::string name_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
-
 study::Shard read_shard(const std::string& text) {
   const std::string_view words = text;
   const std::size_t slash = std::min(words.find('/'), words.size());
@@ -74,32 +72,29 @@ study::Shard read_shard(const std::string& text) {
 
 int run_study(const StudyCommand& command) {
   const study::Shard shard = command.shard ? read_shard(*command.shard) : study::Shard{};
-  const study::Study study = study::make_study(study::load_study(command.file));
-  const study::StudyFolder folder(study_folder(command.file, command.folder),
-                                  study::facts_of(study, name_of(command.file)));
+  const std::string path = study_folder(command.file, command.folder);
   const auto start = std::chrono::steady_clock::now();
-  const std::string path = folder.path().string();
   study::Tally tally;
   std::uint64_t of_all = 0;
   try {
     RunProgress progress;
-    tally = study::compute(study, folder, shard, command.threads,
-                           [&](std::uint64_t done, std::uint64_t all) { progress.show(done, of_all = all); });
-    if (shard.of == 1) folder.merge({});
+    tally = study::run(command.file, path, {.shard = shard, .threads = command.threads},
+                       [&](std::uint64_t done, std::uint64_t all) { progress.show(done, of_all = all); });
   } catch (const Interrupted& interrupted) {
     spdlog::warn(
         "interrupted after {} of {} runs. {} keeps each chunk that is complete ({} runs each); the same command goes "
         "on from there, and `abs_hil study status {}` shows how much is done",
-        interrupted.done, of_all, path, study.script().chunk, path);
+        interrupted.done, of_all, path, study::StudyFolder(path).facts().chunk, path);
     return status_of(signalled());
   }
+  const std::string name = std::filesystem::path(command.file).stem().string();
   if (tally.runs == 0 && shard.of == 1) {
-    cli::print("study {}: complete already; results: {}/{}\n", name_of(command.file), path, study::file::results);
+    cli::print("study {}: complete already; results: {}/{}\n", name, path, study::file::results);
     return exit_completed;
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::string now = tally.earlier > 0 ? fmt::format(", {} of them now", tally.runs) : "";
-  cli::print("study {}: {} runs{} in {}, {:.0f} runs/s; {}{} ended by a fault, {} refused\n", name_of(command.file),
+  cli::print("study {}: {} runs{} in {}, {:.0f} runs/s; {}{} ended by a fault, {} refused\n", name,
              tally.earlier + tally.runs, now, duration_text(spent_s),
              spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0, now.empty() ? "" : "of these ",
              tally.faults, tally.refused);

@@ -15,17 +15,15 @@ namespace abs_hil::python {
 
 namespace {
 
-/// As `abs_hil study FILE --out FOLDER --shard NUMBER/OF`. Returns the number of runs that it computed.
-std::uint64_t run_study(const std::string& file, const std::string& name, const std::string& folder,
-                        std::uint64_t number, std::uint64_t of, std::size_t threads, Interruptible::Progress progress) {
+/// study::run. Returns the number of runs that it computed.
+std::uint64_t run_study(const std::string& file, const std::string& folder, const std::string& name,
+                        std::size_t threads, Interruptible::Progress progress) {
   Interruptible loop(std::move(progress));
   std::uint64_t runs = 0;
   loop.run([&] {
-    const study::Study study = study::make_study(study::load_study(file));
-    const auto tell = [&loop](std::uint64_t done, std::uint64_t all) { loop.after(done, all); };
-    const study::StudyFolder results(folder, study::facts_of(study, name));
-    runs = study::compute(study, results, {.number = number, .of = of}, threads, tell).runs;
-    if (of == 1) results.merge({});
+    runs = study::run(file, folder, {.threads = threads, .name = name}, [&loop](std::uint64_t done, std::uint64_t all) {
+             loop.after(done, all);
+           }).runs;
   });
   return runs;
 }
@@ -49,8 +47,8 @@ std::string facts_of_results(const py::bytes& first_bytes) {
 }  // namespace
 
 void add_studies(py::module_& module) {
-  module.def("run_study", &run_study, py::arg("file"), py::arg("name"), py::arg("folder"), py::arg("number"),
-             py::arg("of"), py::arg("threads"), py::arg("progress") = nullptr);
+  module.def("run_study", &run_study, py::arg("file"), py::arg("folder"), py::arg("name"), py::arg("threads"),
+             py::arg("progress") = nullptr);
   module.def("simulate_run", &simulate_run, py::arg("file"), py::arg("number"));
   module.def("facts_of_results", &facts_of_results, py::arg("first_bytes"));
 }

@@ -38,7 +38,7 @@ def study(study: StudyLike, out: str | os.PathLike[str] | None = None, *, thread
     with ExitStack() as scratch:
         folder = os.fspath(out) if out is not None else os.path.join(scratch.enter_context(tempfile.TemporaryDirectory()), 'study')
         with _file_of(study) as (file, name), progress_shown(progress) as report:
-            _core.run_study(str(file), name, folder, 1, 1, threads, report)
+            _core.run_study(str(file), folder, name, threads, report)
         results = load_study(folder)
         weakref.finalize(results, scratch.pop_all().close)
     return results
