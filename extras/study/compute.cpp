@@ -20,6 +20,7 @@
 #include "rig/formatted_text.hpp"
 #include "run/parallel.hpp"
 #include "run/run.hpp"
+#include "run_folder/run_folder.hpp"
 
 namespace abs_hil::study {
 
@@ -278,10 +279,18 @@ Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard,
           .damaged = std::move(damaged)};
 }
 
-Tally run(const std::string& file, const std::string& folder, const StudyOptions& options, const Progress& progress) {
+std::string folder_of(const std::string& file, const std::optional<std::string>& given) {
+  if (given) return *given;
+  const std::filesystem::path runs = run_folder::default_runs_dir();
+  if (runs.empty()) throw config::ConfigError("ABS_HIL_RUNS_DIR is empty; give the folder of the results with --out");
+  return (runs / std::filesystem::path(file).stem()).string();
+}
+
+Tally run(const std::string& file, const std::optional<std::string>& folder, const StudyOptions& options,
+          const Progress& progress) {
   const Study study = make_study(load_study(file));
   const std::string name = options.name.empty() ? std::filesystem::path(file).stem().string() : options.name;
-  const StudyFolder results(folder, facts_of(study, name));
+  const StudyFolder results(folder_of(file, folder), facts_of(study, name));
   const Tally tally = compute(study, results, options.shard, options.threads, progress);
   if (options.shard.of == 1) results.merge({});
   return tally;

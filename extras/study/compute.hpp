@@ -103,10 +103,15 @@ struct StudyOptions {
   std::string name{};      ///< in the results; empty: the name of the file without its ending
 };
 
+/// The folder of a study's results: the given one, or one of the file's name below runs/. Throws config::ConfigError
+/// where that is switched off.
+[[nodiscard]] std::string folder_of(const std::string& file, const std::optional<std::string>& given);
+
 /// A study as `abs_hil study FILE --out FOLDER`: computes what the folder lacks of the shard, and puts the results
 /// together unless others compute the other shards. The one entry of program and Python. Throws config::ConfigError
 /// for a study that cannot be used, std::runtime_error if a file cannot be written, and what `progress` throws.
-Tally run(const std::string& file, const std::string& folder, const StudyOptions& options, const Progress& progress);
+Tally run(const std::string& file, const std::optional<std::string>& folder, const StudyOptions& options,
+          const Progress& progress);
 
 /// Computes the chunks of a shard that the folder lacks, and writes each as soon as it is finished. The bytes do not
 /// depend on the threads. Memory does not grow with the number of chunks.

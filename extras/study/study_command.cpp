@@ -15,7 +15,6 @@
 #include "program/extra.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"
-#include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
 
 namespace abs_hil::program {
@@ -72,15 +71,15 @@ study::Shard read_shard(const std::string& text) {
 
 int run_study(const StudyCommand& command) {
   const study::Shard shard = command.shard ? read_shard(*command.shard) : study::Shard{};
-  const std::string path = study_folder(command.file, command.folder);
   const auto start = std::chrono::steady_clock::now();
   study::Tally tally;
   std::uint64_t of_all = 0;
   try {
     RunProgress progress;
-    tally = study::run(command.file, path, {.shard = shard, .threads = command.threads},
+    tally = study::run(command.file, command.folder, {.shard = shard, .threads = command.threads},
                        [&](std::uint64_t done, std::uint64_t all) { progress.show(done, of_all = all); });
   } catch (const Interrupted& interrupted) {
+    const std::string path = study::folder_of(command.file, command.folder);
     spdlog::warn(
         "interrupted after {} of {} runs. {} keeps each chunk that is complete ({} runs each); the same command goes "
         "on from there, and `abs_hil study status {}` shows how much is done",
@@ -88,6 +87,7 @@ int run_study(const StudyCommand& command) {
     return status_of(signalled());
   }
   const std::string name = std::filesystem::path(command.file).stem().string();
+  const std::string path = study::folder_of(command.file, command.folder);
   if (tally.runs == 0 && shard.of == 1) {
     cli::print("study {}: complete already; results: {}/{}\n", name, path, study::file::results);
     return exit_completed;
@@ -174,13 +174,6 @@ Action add_study(cli::Parser& parser, const Words& words) {
   command->parser = parser;
   add_options(*command);
   return [command, words] { return study(*command, words); };
-}
-
-std::string study_folder(const std::string& file, const std::optional<std::string>& given) {
-  if (given) return *given;
-  const std::filesystem::path runs = run_folder::default_runs_dir();
-  if (runs.empty()) throw config::ConfigError("ABS_HIL_RUNS_DIR is empty; give the folder of the results with --out");
-  return (runs / std::filesystem::path(file).stem()).string();
 }
 
 int record_run(const study::Study& study, std::uint64_t number, const std::optional<std::string>& folder,

@@ -50,9 +50,6 @@ int submit_study(const StudyCommand& command);
 /// What Slurm says about the jobs of a study's folder: a line each; empty without jobs and without Slurm.
 [[nodiscard]] std::string slurm_jobs(const std::string& folder);
 
-/// The folder of a study: the one given, or one of its name below the folder of runs. Throws config::ConfigError.
-[[nodiscard]] std::string study_folder(const std::string& file, const std::optional<std::string>& given);
-
 /// A signal came while many runs were computed.
 struct Interrupted {
   std::uint64_t done{0};  ///< runs that are complete

@@ -119,7 +119,7 @@ std::string submitted(const std::string& options, const fs::path& file) {
 int submit_study(const StudyCommand& command) {
   check_options(command.sbatch);
   const fs::path file = fs::absolute(command.file);
-  const fs::path path = fs::absolute(study_folder(command.file, command.folder));
+  const fs::path path = fs::absolute(study::folder_of(command.file, command.folder));
   if (path.string().find_first_of("\r\n%\\\"") != std::string::npos) {
     throw config::ConfigError(
         fmt::format("--out {}: Slurm takes %, \\, quotes and line ends in paths for something "
