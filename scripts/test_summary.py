@@ -1,16 +1,55 @@
 #!/usr/bin/python3
-"""test_summary.py RESULTS [LIST...]: what ctest says too briefly: how many tests passed, failed and were skipped, and why.
+"""test_summary.py RESULTS [LIST...]: what ctest says too briefly: what was shown, how many tests passed, failed and were
+skipped, and why.
+test_summary.py --key: a pattern of the tests of level key. test_summary.py --check < NAMES: whether each test has a claim.
 
 RESULTS is the file of ctest --output-junit; the LISTs are the lists of packages that could not be installed. Status 1 if
-the environment has ABS_HIL_MAY_SKIP, a pattern, and a test of another name was skipped or a list is lacking.
+the environment has ABS_HIL_MAY_SKIP, a pattern, and a test of another name was skipped or a list is lacking. The claims are
+those of tests/claims.txt.
 """
 import os
+import pathlib
 import re
 import sys
 from xml.etree import ElementTree
 
 #: how our own tests, pytest -rs and unittest -v say why they skip
 REASONS = re.compile(r"^SKIPPED(?: \[\d+\] \S+?)?:? +(.+)$|\.\.\. skipped ['\"](.+)['\"]$", re.MULTILINE)
+
+
+CLAIMS = pathlib.Path(__file__).resolve().parents[1] / 'tests/claims.txt'
+
+
+def claims() -> list[tuple[str, str, str]]:
+    """(level, pattern of whole names, claim) of each line."""
+    rows = [line.split(' | ') for line in CLAIMS.read_text(encoding='utf-8').splitlines() if line and line[0] != '#']
+    return [(level, '|'.join(names.split()), claim) for level, names, claim in rows]
+
+
+def claim_of(name: str) -> str:
+    return next((claim for _, pattern, claim in claims() if re.fullmatch(pattern, name)), '')
+
+
+def table(named: dict[str, list[ElementTree.Element]]) -> list[str]:
+    """A line for each claim: whether the tests that ran show it."""
+    of = {kind: [claim_of(test.get('name', '')) for test in tests] for kind, tests in named.items()}
+    lines = []
+    for _, _, claim in claims():
+        passed, failed, skipped = (of[kind].count(claim) for kind in ('passed', 'failed', 'skipped'))
+        word = 'WRONG' if failed else 'shown' if passed and not skipped else 'in part' if passed else 'not tried'
+        count = f' ({passed} of {passed + failed + skipped} tests)' if word in ('WRONG', 'in part') else ''
+        lines.append(f'{word:<9}  {claim}{count}')
+    return lines
+
+
+def check(names: list[str]) -> int:
+    without = [name for name in names if not claim_of(name)]
+    empty = [claim for _, pattern, claim in claims() if not any(re.fullmatch(pattern, name) for name in names)]
+    for name in without:
+        print(f'tests/claims.txt: no claim names the test {name}', file=sys.stderr)
+    for claim in empty:
+        print(f'tests/claims.txt: no test of "{claim}" exists', file=sys.stderr)
+    return int(bool(without or empty))
 
 
 def reasons_of(test: ElementTree.Element) -> list[str]:
@@ -26,6 +65,7 @@ def main(path: str, lacking: list[str]) -> int:
         return 1
     named = {kind: [test for test in tests if test.get('status') in of]
              for kind, of in (('passed', ('run',)), ('failed', ('fail',)), ('skipped', ('notrun', 'disabled')))}
+    print('\n'.join(['', *table(named), '']))
     print('test: ' + ', '.join(f'{len(these)} {kind}' for kind, these in named.items()))
     for test in named['failed']:
         print(f'test: failed: {test.get("name")}')
@@ -46,4 +86,7 @@ def main(path: str, lacking: list[str]) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1], sys.argv[2:]))
+    if sys.argv[1] == '--key':
+        print('^(' + '|'.join(pattern for level, pattern, _ in claims() if level == 'key') + ')$')
+    else:
+        sys.exit(check(sys.stdin.read().split()) if sys.argv[1] == '--check' else main(sys.argv[1], sys.argv[2:]))

@@ -48,7 +48,7 @@ if [ -n "${CCACHE_DIR:-}" ] || [ -d "$HOME/.cache/ccache" ]; then
   mkdir -p "$root/srv/.cache/ccache" "$root/srv/.config/ccache"
   mount --bind "${CCACHE_DIR:-$HOME/.cache/ccache}" "$root/srv/.cache/ccache"
 fi
-for command in scripts/run.sh scripts/test.sh; do
+for command in scripts/run.sh scripts/test.sh "scripts/test.sh rest"; do
   step "$command"
   status=0
   inside bash -c "cd /srv/abs_hil && $command" >"$root.log" 2>&1 || status=$?
