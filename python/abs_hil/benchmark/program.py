@@ -129,10 +129,8 @@ def main(given: argparse.Namespace) -> int:
         if len(entries) > 1:
             print(f'abs_hil benchmark: {entry.label}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
     print(table(results), end='')
-    if given.page is not None:
-        page = html(results, whole) if given.page.suffix == '.html' else text(results, whole)
     if given.json is not None:
         write_text(given.json, as_json(results, whole, _core.version))
     if given.page is not None:
-        write_text(given.page, page)
+        write_text(given.page, html(results, whole) if given.page.suffix == '.html' else text(results, whole))
     return 0

@@ -4,7 +4,7 @@ import importlib.util
 import math
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,9 +57,8 @@ class Entry:
         return made(self.name)
 
 
-def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
+def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
     nominal = {plant: {name: row['value'] for name, row in keys(plant=plant).items()} for plant in {case.plant for case in cases}}
-    runs = []
     for case in cases:
         values: dict[str, Value] = {
             **case.values(nominal[case.plant]), 'experiment.start_speed_rad_s': coasted(case)[0],
@@ -67,8 +66,7 @@ def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dic
         run = {'controller': entry.name, 'plant': case.plant, 'experiment': EXPERIMENT, 'set': values}
         if entry.warm:
             run['set'] = values | kept(run)
-        runs += [{**run, 'seed': seed} for seed in seeds]
-    return runs
+        yield from ({**run, 'seed': seed} for seed in seeds)
 
 
 def kept(run: Mapping[str, Any]) -> dict[str, Value]:
@@ -78,7 +76,7 @@ def kept(run: Mapping[str, Any]) -> dict[str, Value]:
 
 def keeps(entry: Entry, case: Case) -> bool:
     """Whether a law keeps anything, so that a warm entry of it makes sense."""
-    return not entry.without_host and bool(kept(_runs(entry, [case], [FIRST_SEED])[0]))
+    return not entry.without_host and bool(kept(next(_runs(entry, [case], [FIRST_SEED]))))
 
 
 FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSHOOT, 'slip_largest', 'time_locked_s')
@@ -97,7 +95,7 @@ def _in_this_process(entry: Entry, run: dict[str, Any]) -> Study:
     return study
 
 
-def _results(entry: Entry, runs: list[dict[str, Any]], threads: int) -> Study:
+def _results(entry: Entry, runs: Iterator[dict[str, Any]], threads: int) -> Study:
     if not entry.without_host:
         return simulate_many(runs, threads=threads)
     studies = [_in_this_process(entry, run) for run in runs]

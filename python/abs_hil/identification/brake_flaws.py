@@ -74,7 +74,9 @@ def with_flaws(log: Log, motion: Motion, values: Mapping[str, float], delay_s: f
             keeps = np.exp(-fading * heat_J(_asking(asks, targets, values), motion, {**values, 'u0': 0.0}))
             targets = [one * keeps for one in asked]
     if hysteresis := values.get(HYSTERESIS.key, 0.0):
-        hanging = _hanging(np.stack(targets, axis=1).ravel(), hysteresis)
+        pulls = np.stack(targets, axis=1).ravel()
+        ends = zip(((1.0 - hysteresis) * pulls).tolist(), ((1.0 + hysteresis) * pulls).tolist())
+        hanging = np.array([*itertools.accumulate(ends, lambda held, end: min(max(held, end[0]), end[1]), initial=0.0)][1:])
         targets = [hanging[::2], hanging[1::2]]
     return _asking(asks, targets, values), {**values, 'u0': 0.0}
 
@@ -100,8 +102,3 @@ def leaky(log: Log, leaves_per_s: float, comes: np.ndarray) -> np.ndarray:
 def _asking(log: Log, targets_Nm: Sequence[np.ndarray], values: Mapping[str, float]) -> Log:
     before, duty = (np.where(one > 0.0, (one - values['b2_Nm']) / values['b1_Nm'], 0.0) for one in targets_Nm)
     return dataclasses.replace(log, brake_pwm=duty, brake_before=before)
-
-
-def _hanging(target: np.ndarray, hysteresis: float) -> np.ndarray:
-    ends = zip(((1.0 - hysteresis) * target).tolist(), ((1.0 + hysteresis) * target).tolist())
-    return np.array([*itertools.accumulate(ends, lambda held, end: min(max(held, end[0]), end[1]), initial=0.0)][1:])

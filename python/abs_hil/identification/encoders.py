@@ -24,7 +24,7 @@ errors that come and go with each row 20 times their covariance. So the mean of 
 where c is what the steps of both counters have in common. A straight line through the means of short blocks gives j.
 """
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,17 +82,15 @@ def slots_of(logs: Sequence[Log], motions: Sequence[Motion], counts_per_rev: int
     return found
 
 
-def weighed(logs: Sequence[Log], motions: Sequence[Motion], slots: dict[str, Slots]) -> list[Motion]:
+def weighed(logs: Sequence[Log], motions: Sequence[Motion], slots: dict[str, Slots]) -> Iterator[Motion]:
     """The motions with the weights that readings of such discs have."""
-    out = []
     for at, (log, motion) in enumerate(zip(logs, motions)):
         weight = motion.weight.copy()
         for wheel, of in slots.items():
             number = WHEELS.index(wheel)
             parity = _parity(np.nan_to_num(log.counts[:, number]) + log.first_counts[number])
             weight[:, number] /= (1.0 + of.signs[at] * of.error_counts * parity)**2
-        out.append(dataclasses.replace(motion, weight=weight))
-    return out
+        yield dataclasses.replace(motion, weight=weight)
 
 
 def middles(exact_counts: np.ndarray, error_counts: np.ndarray) -> np.ndarray:
@@ -146,8 +144,6 @@ def _blocks(log: Log, motion: Motion, per_count_rad: float) -> np.ndarray:
     turn = speed * log.period_s
     used = (even[:-2] & even[1:-1] & even[2:] & ~moves[1:-2] & np.isfinite(third).all(axis=1)
             & ((turn > LEAST_COUNTS_PER_ROW * per_count_rad) & (turn < LARGEST_TURN_RAD)).all(axis=1))
-    if not used.any():
-        return np.empty((0, 3))
     number = np.floor(log.time_s[1:-2][used] / BLOCK_S)
     number = np.unique(number, return_inverse=True)[1]
     rows = np.bincount(number)

@@ -47,9 +47,7 @@ def other_costs(fit: Fit, affected: Sequence[bool], others: Sequence[tuple[Probl
     other parameters may follow only as far as they are uncertain."""
     within = 5.0 * np.sqrt(np.diag(fit.covariance()))
     found, of_log = filtered(fit, [piece for piece, hit in zip(fit.pieces, affected) if not hit], fit.disturbances), {}
-    for piece, hit in zip(fit.pieces, affected):
-        if not hit:
-            continue
+    for piece in [piece for piece, hit in zip(fit.pieces, affected) if hit]:
         fit.problem.check()
         if piece.log not in of_log:
             of_log[piece.log] = [problem.simulated(piece.log, values) for problem, values in others]

@@ -143,9 +143,7 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             continue
         if p.key == 'u0':
             parameters[p.key] = _u0(value, finished.gaps if _known(parameters.get('b1_Nm')) else [])
-            if _told_by_no_log(parameters, notes):
-                continue
-            if parameters[p.key].status != 'identified':
+            if not _told_by_no_log(parameters, notes) and parameters[p.key].status != 'identified':
                 cures.setdefault(p.cure, []).append(p.key)
             continue
         sd = float(np.sqrt(np.maximum(spread.covariance[i, i], 0.0))) * float(fit.scale[i])

@@ -4,6 +4,7 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 import scipy.stats
 
 from ..core import _core
@@ -142,9 +143,7 @@ def disc(fit: Fit, spread: Spread, wheel: str) -> tuple[float, float, float | No
                 float(np.sqrt(along @ spreads @ along)) / e)
     pairs = values.reshape(-1, 2)
     each = np.hypot(*pairs.T)
-    outward = np.zeros((logs, 2 * logs))
-    for i in range(logs):
-        outward[i, 2 * i:2 * i + 2] = pairs[i] / each[i]
+    outward = scipy.linalg.block_diag(*(pairs / each[:, None]))
     weight = np.linalg.solve(outward @ covariance @ outward.T, np.ones(logs))
     weight /= weight.sum()
     return float(weight @ each), float(np.sqrt(weight @ outward @ scattered @ outward.T @ weight)), None, np.nan

@@ -37,7 +37,9 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
     """Fills `linear` of each piece; returns the scale of the parameters' changes. `fill` adds to a piece's columns, before only
     the filter's sums of them are kept."""
     scale = np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
-    own = {'u0': _duty_step(problem, values['u0']), DELAY: 1e-5, DEAD_TIME.key: 1e-6}
+    near = np.sort(np.abs(problem.duties - values['u0']))
+    # A change of u0 reaches other duties of the logs: two steps of the brake's PWM at least.
+    own = {'u0': float(np.clip(near[min(4, len(near) - 1)], 5e-4, 0.02)), DELAY: 1e-5, DEAD_TIME.key: 1e-6}
     steps = [own.get(p.key, 1e-5 * one) for p, one in zip(problem.parameters, scale)]
     steps = [size if values[p.key] + size <= p.most else -size for p, size in zip(problem.parameters, steps)]
     for number in range(len(problem.logs)):
@@ -53,9 +55,7 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
             moved.append((problem.plant_values(changed, number, asked), steps[i] / scale[i],
                           'brake' if p.acts == 'flaw' else p.acts, *((asked[0].inputs(),) if brakes and act(changed) else ())))
         nominal, inputs = problem.plant_values(values, number, asks), asks[0].inputs()
-        for piece in pieces:
-            if piece.log != number:
-                continue
+        for piece in [piece for piece in pieces if piece.log == number]:
             problem.check()
             piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
             piece.columns = there
@@ -117,12 +117,6 @@ def disc_waves_rad(problem: Problem, values: Mapping[str, float], log: int, angl
         number, (sine, cosine) = WHEELS.index(wheel), disc_of(wheel, log)
         waves[:, number] = values[sine.key] * np.sin(place[:, number]) + values[cosine.key] * np.cos(place[:, number])
     return waves
-
-
-def _duty_step(problem: Problem, u0: float) -> float:
-    """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
-    near = np.sort(np.abs(problem.duties - u0))
-    return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
 
 
 def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The page of an identification: fits, residuals, intervals, correlations, what to run next."""
 import pathlib
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -28,9 +29,8 @@ def _parameters(found: Identified) -> Table:
     return Table('parameters', ['parameter', 'value', 'unit', 'interval of 95 %', 'half width', 'status'], rows)
 
 
-def _log_figures(found: Identified) -> list[Figure]:
+def _log_figures(found: Identified) -> Iterator[Figure]:
     fit = found.fit
-    figures = []
     left_in: dict[str, list[str]] = {log.name: [] for log in found.logs}
     for rms, name, phase in residuals(fit):
         left_in[name].append(f'{phase or "all"} {rms:.3f}')
@@ -48,14 +48,13 @@ def _log_figures(found: Identified) -> list[Figure]:
         shown_left = np.where(weight > 0, left, np.nan)
         left_over = [Curve(0, f'residual, {name}', run_style(i), *_thinned(log.time_s[rows], shown_left[:, i]), group=name)
                      for i, name in enumerate(('upper wheel', 'lower wheel')) if pieces]
-        figures.append(Figure(
+        yield Figure(
             f'log-{number + 1}', log.name, Label('time, s', 'time, s'),
             [Panel(Label('speed, rad/s', 'speed, rad/s'), speeds, height_px=150.0),
              Panel(Label('duty', 'duty'), duties, height_px=90.0),
              Panel(Label('residual, counts', 'residual, counts'), left_over, height_px=110.0)],
             caption=f'{len(log)} rows; residual by phase: {", ".join(left_in[log.name])}.', axis=f'log-{number + 1}',
-            shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)]))
-    return figures
+            shades=[Shade(float(log.time_s[a]), float(log.time_s[b - 1]), 'hold') for a, b in stretches(log.wheels_apart != 0)])
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,7 +74,7 @@ def _correlations(found: Identified) -> Table:
 
 
 def page(found: Identified, advice: list[Advice]) -> str:
-    figures = _log_figures(found)
+    figures = [*_log_figures(found)]
     validation = Table('validation', ['', 'measured', 'predicted', 'interval', 'error'], [])
     if found.validation is not None:
         v = found.validation

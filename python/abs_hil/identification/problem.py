@@ -113,10 +113,10 @@ class Problem:
         slots = slots_of(logs, motions, counts_per_rev)
         known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
         given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
-        keys = {p.key for p in form.parameters} | {RATE_LIMIT.key}
+        own = {key: known[key] for key in (*(p.key for p in form.parameters), RATE_LIMIT.key) if key in known}
         jitter_s, doubt = jitter_of(logs, motions, counts_per_rev)
-        return cls(form, base, logs, weighed(logs, motions, slots), segments, given, {k: v for k, v in known.items() if k in keys},
-                   counts_per_rev, tuple(drifts), discs=tuple(discs), slots=slots, jitter_s=jitter_s, jitter_doubt=doubt)
+        return cls(form, base, logs, [*weighed(logs, motions, slots)], segments, given, own, counts_per_rev, tuple(drifts),
+                   discs=tuple(discs), slots=slots, jitter_s=jitter_s, jitter_doubt=doubt)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

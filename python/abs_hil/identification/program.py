@@ -71,17 +71,13 @@ def _fixed(texts: list[str]) -> dict[str, float | None]:
 
 def _write(out: pathlib.Path, content: dict[str, Any], model: str, report: str | None) -> None:
     """identified.json, model.toml unless it is empty, and the page."""
-    files = {'identified.json': json.dumps(content, indent=1, allow_nan=False) + '\n'}
-    if model:
-        files['model.toml'] = model
-    else:
+    if not model:
         (out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
-    if report is not None:
-        files['report.html'] = report
-    for name, text in files.items():
-        path = out / name
-        write_text(path, text)
-        print(path)
+    identified = json.dumps(content, indent=1, allow_nan=False) + '\n'
+    for name, text in (('identified.json', identified), ('model.toml', model), ('report.html', report)):
+        if text:
+            write_text(out / name, text)
+            print(out / name)
 
 
 def _speeds(o: argparse.Namespace, fixed: dict[str, float | None], progress: Progress) -> int:
@@ -95,8 +91,7 @@ def _speeds(o: argparse.Namespace, fixed: dict[str, float | None], progress: Pro
         found = identify_speeds([load_trace(file, keys) for file, keys in told[1:]], o.start, fix=fixed, say=progress.say,
                                 check=progress.check)
     finally:
-        progress.clear()
-    progress.end()
+        progress.end()
     if not found.misfit:
         print('\n'.join(words(found.parameters)), flush=True)
     for line in (*(f'{name}: {kind} fitted within {rms:.3g} {unit} RMS' for name, kind, rms, unit in found.left), *found.notes,

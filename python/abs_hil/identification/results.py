@@ -2,7 +2,7 @@
 import datetime
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def as_toml(found: Identified) -> str:
     if form is not FORMS['magic-formula']:
         plant += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in _OF_THE_START]
     return _file(f'residual {found.residual_counts_rms:.4f} counts RMS (0.2887 if nothing but the counts disturbs)', found.logs,
-                 found.notes, form, plant, _believed(found))
+                 found.notes, form, plant, [*_believed(found)])
 
 
 def _line(key: str, e: Estimate) -> str:
@@ -98,18 +98,17 @@ def _file(about: str, sources: Sequence[Log] | Sequence[Trace], notes: list[str]
     return '\n'.join(lines) + '\n'
 
 
-def _believed(found: Identified) -> list[str]:
+def _believed(found: Identified) -> Iterator[str]:
     """Lines of the table [model]: where controllers believe something else than the plant."""
-    lines = []
     if found.fit.problem.form is not FORMS['magic-formula']:
-        lines.append("# What controllers believe of the tyre: the magic formula nearest to the plant's force in braking.")
-        lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found.fit.problem.base, found.values()).items()]
+        yield "# What controllers believe of the tyre: the magic formula nearest to the plant's force in braking."
+        tyre = equivalent_tyre(found.fit.problem.base, found.values())
+        yield from (f'{key} = {_number(value)}' for key, value in tyre.items())
     for wheel in WHEELS:
         phase = found.parameters.get(f'{wheel}_encoder_phase_rad')
         if phase is not None and phase.status != 'identified':
-            lines.append("# Counters begin anew at another place of the disc: without its phase the eccentricity is no help.")
-            lines.append(f'{wheel}_encoder_eccentricity_rad = 0.0')
-    return lines
+            yield "# Counters begin anew at another place of the disc: without its phase the eccentricity is no help."
+            yield f'{wheel}_encoder_eccentricity_rad = 0.0'
 
 
 def _number(value: float) -> str:

@@ -18,7 +18,7 @@ Of each trace its own, and not reported: the speed at which it begins, the insta
 slip and lower wheel, from readings before the brake where there are enough of them.
 """
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -148,7 +148,7 @@ class Model:
         return [left for number, trace in enumerate(self.traces) for left in self._left(
             trace, plant, {one.key: one.value(at) for one, at in zip(self.free, x) if one.trace == number})]
 
-    def _left(self, trace: Trace, plant: Mapping[str, float], own: Mapping[str, float]) -> list[np.ndarray]:
+    def _left(self, trace: Trace, plant: Mapping[str, float], own: Mapping[str, float]) -> Iterator[np.ndarray]:
         keys, radii, changes = trace.keys, self.radii, trace.duty_time_s.copy()
         if 'edge' in own:
             first = int(np.argmax(trace.brake_pwm > 0.0))
@@ -169,7 +169,6 @@ class Model:
         def speed(wheel: str, ends: np.ndarray) -> np.ndarray:
             of = angles[:, 0 if wheel == 'upper' else 1]
             return (np.interp(ends, time_s, of) - np.interp(ends - window, time_s, of)) / window
-        out = []
         for one in trace.channels:
             scale = trace.scales.get(one.kind, own.get(f'scale_{one.kind}', 1.0))
             if one.kind == 'slip':
@@ -177,8 +176,7 @@ class Model:
                 read = 1.0 - scale * upper / np.maximum(lower, 1e-3)
             else:
                 read = scale * (radii[one.kind] if one.at_rim else 1.0) * speed(one.kind, one.time_s - ages['speed'])
-            out.append(one.value - read)
-        return out
+            yield one.value - read
 
 
 def _least(model: Model, x0: np.ndarray, sizes: Sequence[float], most: int, held: str = '',
@@ -247,13 +245,11 @@ def identify_speeds(traces: Sequence[Trace], start: PathLike = 'inteco-manual', 
     return _assembled(model, found, covariance, groups, moves)
 
 
-def _stretches(traces: Sequence[Trace]) -> list[tuple[int, float, float]]:
-    out = []
+def _stretches(traces: Sequence[Trace]) -> Iterator[tuple[int, float, float]]:
     for number, trace in enumerate(traces):
         count = int(np.clip(round((trace.end_s - trace.begin_s) / STRETCH_S), 1 if len(traces) > 1 else 2, MOST_STRETCHES))
         edges = np.linspace(trace.begin_s, trace.end_s + 1e-6, count + 1).tolist()
-        out += [(number, begin, end) for begin, end in zip(edges, edges[1:])]
-    return out
+        yield from ((number, begin, end) for begin, end in zip(edges, edges[1:]))
 
 
 def _assembled(model: Model, x: np.ndarray, covariance: np.ndarray, groups: int, moves: Sequence[np.ndarray]) -> SpeedsFound:

@@ -14,7 +14,7 @@ z says that a column takes something off, never that it explains: beside the opt
 where it rests, and a cause is named only if it suffices (90 % of the gain of all columns together), no other one has half of its
 gain, and logs that are left out say the same.
 """
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -248,15 +248,13 @@ def unsettled(fit: Fit, disturbances: Disturbances) -> np.ndarray:
     return out
 
 
-def _signals(fit: Fit) -> list[Signals]:
+def _signals(fit: Fit) -> Iterator[Signals]:
     problem, values = fit.problem, fit.values
-    out = []
     for number, motion in enumerate(problem.motions):
         omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
         sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
         torque = brake_torques(*problem.flawed(number, values))
-        out.append(Signals(torque, omega, motion.smooth_rad, sliding, problem.logs[number]))
-    return out
+        yield Signals(torque, omega, motion.smooth_rad, sliding, problem.logs[number])
 
 
 def explained(fit: Fit, disturbances: Disturbances) -> tuple[Fit, list[Found]]:

@@ -30,7 +30,7 @@ class Braking(gymnasium.Env):
         if render_mode not in (None, *MODES):
             raise ValueError(f'render_mode {render_mode!r}: give one of {", ".join(MODES)}, or None')
         self.render_mode = render_mode
-        self.observation_space, self.action_space = observation_space(), action_space()
+        self.observation_space, self.action_space = spaces()
         self.metadata = {**self.metadata, 'render_fps': round(1.0 / period_s)}
         self._period_s = period_s
         self._rows: list[np.ndarray] = []
@@ -61,12 +61,9 @@ class Braking(gymnasium.Env):
         return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def observation_space() -> gymnasium.spaces.Box:
-    return gymnasium.spaces.Box(LOW, HIGH, dtype=np.float32)
-
-
-def action_space() -> gymnasium.spaces.Box:
-    return gymnasium.spaces.Box(np.float32(0.0), np.float32(1.0), (1,), np.float32)
+def spaces() -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
+    """Of observations and of actions."""
+    return gymnasium.spaces.Box(LOW, HIGH, dtype=np.float32), gymnasium.spaces.Box(np.float32(0), np.float32(1), (1,), np.float32)
 
 
 def check_options(options: Mapping[str, Any] | None, *known: str) -> None:
@@ -128,7 +125,7 @@ class SlipControlVector(VectorEnv):
                  threads: int = 0, **task: Any) -> None:
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self.single_observation_space, self.single_action_space = observation_space(), action_space()
+        self.single_observation_space, self.single_action_space = spaces()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.metadata = {'autoreset_mode': AutoresetMode.NEXT_STEP, 'render_modes': []}

@@ -150,8 +150,6 @@ class RigSlipControl(Braking):
 
     def _end(self) -> None:
         process, self._process = self._process, None
-        if process is None:
-            return
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait()
+        if process is not None:
+            process.send_signal(signal.SIGINT)  # nothing if it has ended
+            process.wait()

@@ -72,7 +72,6 @@ def train(task: Task, generations: int, seed: int, *, population: int = 40, plan
     generator = np.random.default_rng(seed)
     mean, spread = np.zeros(Policy.SIZE), np.full(Policy.SIZE, 0.5)
     curve = Curve()
-    elite_size = population // 4
     rigs = Rigs(population * plants, task, seed=TRAINING_SEED, threads=threads)
     alone = Rigs(plants, task, seed=TRAINING_SEED, threads=threads)
     for generation in range(generations):
@@ -80,7 +79,7 @@ def train(task: Task, generations: int, seed: int, *, population: int = 40, plan
         # Every candidate meets the same plants, others in each generation.
         total = returns(rigs, Policy(np.repeat(candidates, plants, axis=0)), generation * plants, plants)
         total = total.reshape(population, plants).mean(axis=1)
-        order = np.argsort(-total, kind='stable')[:elite_size]
+        order = np.argsort(-total, kind='stable')[:population // 4]
         mean = candidates[order].mean(axis=0)
         spread = candidates[order].std(axis=0) + 0.02 / (1 + generation)
         curve.elite.append(float(total[order].mean()))

@@ -102,11 +102,9 @@ def solve(rig: Rig, start: np.ndarray, start_s: float, road: Sequence[Piece], en
             continue
         try:
             found = _solve(rig, start, start_s, phases, end_speed_m_s)
+            best = found if best is None or found.distance_m < best.distance_m else best
         except NoOptimum as none:
             problem = str(none)
-            continue
-        if best is None or found.distance_m < best.distance_m:
-            best = found
     if best is None:
         raise NoOptimum(problem)
     return best
@@ -114,20 +112,14 @@ def solve(rig: Rig, start: np.ndarray, start_s: float, road: Sequence[Piece], en
 
 def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase], end_speed_m_s: float) -> Trajectory:
     rates = {stands: rig.rates_function(stands) for stands in (False, True)}
-    symbols: list[ca.SX] = []
-    guesses: list[float] = []
-    least: list[float] = []
-    most: list[float] = []
+    variables: list[tuple[ca.SX, np.ndarray, np.ndarray, np.ndarray]] = []  # symbols, first guess, least, most
     constraints: list[ca.SX] = []  # zero in a solution
     within: list[ca.SX] = []  # torques and commands in [0, max_torque_Nm]
     lasting: list[ca.SX] = []  # durations that are not variables
 
     def variable(first: np.ndarray, lowest: np.ndarray, highest: np.ndarray) -> ca.SX:
-        symbols.append(ca.SX.sym('w', len(first)))
-        guesses.extend(first)
-        least.extend(lowest)
-        most.extend(highest)
-        return symbols[-1]
+        variables.append((ca.SX.sym('w', len(first)), first, lowest, highest))
+        return variables[-1][0]
 
     slowest = 0.5 * end_speed_m_s / rig['r2_m']
     ceiling = np.array([1.0, 2.0 * float(start[OMEGA2]), rig.max_torque_Nm, 1e3]) / SCALE
@@ -184,10 +176,11 @@ def _solve(rig: Rig, start: np.ndarray, start_s: float, phases: Sequence[Phase],
                 constraints.append(x[SLIP] - float(1.0 / SCALE[SLIP]))
     cost += float(SCALE[DISTANCE]) * x[DISTANCE]
 
+    symbols, first, least, most = zip(*variables)
     w = ca.vertcat(*symbols)
     zeros = ca.vertcat(*constraints)
     solver = ca.nlpsol('braking', 'ipopt', {'x': w, 'f': cost, 'g': ca.vertcat(zeros, *within, *lasting)}, SOLVER)
-    found = solver(x0=guesses, lbx=least, ubx=most,
+    found = solver(x0=np.concatenate(first), lbx=np.concatenate(least), ubx=np.concatenate(most),
                    lbg=np.concatenate([np.zeros(zeros.numel() + len(within)), np.full(len(lasting), SHORTEST_S)]),
                    ubg=np.concatenate([np.zeros(zeros.numel()), np.full(len(within), rig.max_torque_Nm),
                                        np.full(len(lasting), np.inf)]))
