@@ -8,12 +8,10 @@ import warnings
 from typing import Any
 
 try:
-    from . import _core
+    from . import _core as _core
 except ImportError as error:  # a build without it, or for another Python
     raise ImportError(f'abs_hil: the compiled module is missing ({error}); build it for this Python '
                       f'({sys.version.split()[0]}): `pip install .` in the source folder') from error
-
-__all__ = ['_core', 'load_network']
 
 
 def _config_dir() -> pathlib.Path | None:

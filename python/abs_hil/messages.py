@@ -17,10 +17,8 @@ from typing import Any
 from .places import folders, place_of
 
 #: name -> class of every message type
-TYPES: dict[str, Any] = {}
-for _module in pkgutil.iter_modules(folders()):
-    if _module.name.endswith('_t'):
-        TYPES[_module.name] = getattr(importlib.import_module(f'.{_module.name}', __package__), _module.name)
+TYPES: dict[str, Any] = {one.name: getattr(importlib.import_module(f'.{one.name}', __package__), one.name)
+                         for one in pkgutil.iter_modules(folders()) if one.name.endswith('_t')}
 
 
 def _table(name: str, key: str) -> dict[Any, dict[str, Any]]:
@@ -100,13 +98,12 @@ def live(url: str = '', *, channel: str = 'TELEMETRY', prefix: str = 'ABS_', tim
     """
     from .core import load_network  # decoding needs Python alone
     subscription = load_network('abs_hil.live').Subscription(url, re.escape(prefix + channel))
-    return _messages(subscription, timeout_s)
 
-
-def _messages(subscription: Any, timeout_s: float | None) -> Iterator[Any]:
-    while True:
-        if (received := subscription.next(1.0 if timeout_s is None else timeout_s)) is not None:
-            with contextlib.suppress(ValueError):
-                yield decode(received[1])
-        elif timeout_s is not None:
-            return
+    def messages() -> Iterator[Any]:
+        while True:
+            if (received := subscription.next(1.0 if timeout_s is None else timeout_s)) is not None:
+                with contextlib.suppress(ValueError):
+                    yield decode(received[1])
+            elif timeout_s is not None:
+                return
+    return messages()

@@ -68,8 +68,9 @@ def _take_controller_files() -> None:
         _core.take_controller_files(ending, maker)
 
 
-def text_of(value: Value) -> str:
-    """The value as --set takes it: numbers in full, true and false. NumPy's scalars count as Python's."""
+def text_of(value: Value, what: str = '') -> str:
+    """The value as --set takes it: numbers in full, true and false. NumPy's scalars count as Python's. Raises ValueError, whose
+    text begins with `what`, for any other."""
     value = getattr(value, 'item', lambda: value)()
     if isinstance(value, bool):
         return 'true' if value else 'false'
@@ -77,7 +78,7 @@ def text_of(value: Value) -> str:
         return str(value)
     if isinstance(value, float):
         return repr(value)
-    raise ValueError(f'{value!r} is no configuration value; give a number, True, False or a text')
+    raise ValueError(f'{what}{value!r} is no configuration value; give a number, True, False or a text')
 
 
 def settings_of(texts: Sequence[str], form: str = 'KEY=VALUE') -> dict[str, Value]:
@@ -91,13 +92,7 @@ def settings_of(texts: Sequence[str], form: str = 'KEY=VALUE') -> dict[str, Valu
 def _assignments(values: Any) -> list[str]:
     if not isinstance(values, Mapping):
         raise ValueError(f'set {values!r}: give a dictionary of values by dotted key, as {{"plant.theta_N": 30}}')
-    assignments = []
-    for key, value in values.items():
-        try:
-            assignments.append(f'{key}={text_of(value)}')
-        except ValueError as error:
-            raise ValueError(f'set: {key}: {error}') from None
-    return assignments
+    return [f'{key}={text_of(value, f"set: {key}: ")}' for key, value in values.items()]
 
 
 def options(*, controller: Any = None, plant: PathLike | None = None, model: PathLike | None = None,

@@ -25,9 +25,6 @@ class _Kept:
     def __reduce__(self) -> tuple[Any, ...]:
         return _made_again, (type(self), self._given, _core.version, self.state_bytes())  # type: ignore[attr-defined]
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Any:
-        return copy.copy(self)
-
 
 def _made_again(kind: Any, given: dict[str, Any], version: str, state: bytes) -> Any:
     if version != _core.version:

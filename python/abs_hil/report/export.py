@@ -80,9 +80,7 @@ class Exporter:
 
 
 def _without_nan(values: np.ndarray) -> list[Any]:
-    if values.dtype == object:
-        return values.tolist()
-    return [value if math.isfinite(value) else None for value in values.tolist()]
+    return [value if isinstance(value, str) or math.isfinite(value) else None for value in values.tolist()]
 
 
 def _ascii(text: str) -> str:

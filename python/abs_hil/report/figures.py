@@ -2,8 +2,8 @@
 histograms of the cycle's timing."""
 import itertools
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, Union
 
 import numpy as np
@@ -38,8 +38,8 @@ Choice = Union[str, tuple[float, float]]
 class Options:
     choice: Choice = 'brake'
     paper_colours: bool = False
-    groups: list[int] = field(default_factory=list)  # of each run; runs of one group share a style. Empty: none
-    group_labels: list[str] = field(default_factory=list)
+    groups: Sequence[int] = ()  # of each run; runs of one group share a style. Empty: none
+    group_labels: Sequence[str] = ()
 
 
 @dataclass
@@ -187,10 +187,9 @@ class FigureMaker:
         for run in range(len(self.runs)):
             values = self.profiles[run][quantity].y
             values = values[np.concatenate(([True], values[1:] != values[:-1]))] if len(values) else values
-            if any(np.array_equal(values, other, equal_nan=True) for other in drawn):
-                continue
-            drawn.append(values)
-            self._add(panel, run, quantity, REFERENCE, legend, legend, f'{legend} of {panel.title}')
+            if not any(np.array_equal(values, other, equal_nan=True) for other in drawn):
+                drawn.append(values)
+                self._add(panel, run, quantity, REFERENCE, legend, legend, f'{legend} of {panel.title}')
 
     def _relevant(self, quantities: tuple[str, ...], least: tuple[float, float]) -> tuple[float, float] | None:
         """Range of y above 3 m/s; towards standstill slip and its estimates diverge."""

@@ -24,12 +24,10 @@ MOST_BESIDE = 3  # runs whose figures of merit stand beside the first figure
 
 def plotly_js() -> str:
     """The source of plotly.js: of the Python package plotly, or the copy that a Debian package brings."""
-    places = [_FOLDER / 'plotly.min.js']
     found = importlib.util.find_spec('plotly')
-    if found is not None and found.submodule_search_locations:
-        places.insert(0, pathlib.Path(found.submodule_search_locations[0]) / 'package_data' / 'plotly.min.js')
-    for place in places:
-        if place.exists():
+    folders = (found.submodule_search_locations if found is not None else None) or []
+    for folder in (*(pathlib.Path(one) / 'package_data' for one in folders), _FOLDER):
+        if (place := folder / 'plotly.min.js').exists():
             return place.read_text(encoding='utf-8')
     raise Unavailable(f'plotly.js, which the page shows its figures with, is missing; install it: {how_to_install("plotly")}')
 

@@ -115,9 +115,7 @@ def _shapes(figure: Figure) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]
             shapes.append({'type': 'rect', 'xref': 'x', 'yref': 'paper', 'x0': shade.x0, 'x1': shade.x1, 'y0': 0, 'y1': 1,
                            'fillcolor': phase_colour(shade.phase), 'line': {'width': 0}, 'layer': 'below'})
     free_from = [-math.inf] * MARK_LINES
-    for mark in sorted(figure.marks, key=lambda mark: mark.x):
-        if not low <= mark.x <= high:
-            continue
+    for mark in sorted((mark for mark in figure.marks if low <= mark.x <= high), key=lambda mark: mark.x):
         colour = '#D55E00' if mark.fault else '#666666'
         shapes.append({'type': 'line', 'xref': 'x', 'yref': 'paper', 'x0': mark.x, 'x1': mark.x, 'y0': 0, 'y1': 1,
                        'line': {'color': colour, 'width': 1, 'dash': '4px,3px'}})

@@ -50,15 +50,12 @@ def _lead(runs: list[RunFiles]) -> str:
     return f'{lead}, experiment{"" if len(names) == 1 else "s"} {", ".join(names)}' if names else lead
 
 
-def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
-    """Gives runs of one series a style for each varied value, if the palette has enough colours."""
+def _groups(studies: list[SeriesStudy], runs: int) -> tuple[list[int], list[str]]:
+    """Of runs of one series: a style for each varied value, if the palette has enough colours; and what each style means."""
     if len(studies) != 1 or len(studies[0].groups) > STYLES or sum(len(g.runs) for g in studies[0].groups) != runs:
-        return
-    options.groups = [0] * runs
-    for number, group in enumerate(studies[0].groups):
-        options.group_labels.append(group.label)
-        for run in group.runs:
-            options.groups[run] = number
+        return [], []
+    style_of = {run: number for number, group in enumerate(studies[0].groups) for run in group.runs}
+    return [style_of[run] for run in range(runs)], [group.label for group in studies[0].groups]
 
 
 def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice, of_paper: bool,
@@ -70,9 +67,7 @@ def make(paths: Sequence[Any], labels: Sequence[str], title: str, choice: Choice
     if of_paper:
         paper.order_for_paper(runs, found.notes)
     studies = [study(*series, runs) for series in found.series]
-    options = Options(choice, of_paper)
-    _groups(studies, len(runs), options)
-    surveys, figures = run_figures(runs, options, progress)
+    surveys, figures = run_figures(runs, Options(choice, of_paper, *_groups(studies, len(runs))), progress)
     series: list[dict[str, Any]] = [
         {'name': one.name, 'figure': series_figure(number, one, runs, surveys), 'groups': group_table(one, runs, surveys),
          'table': series_table(one, runs, surveys)} for number, one in enumerate(studies, 1)]
@@ -100,10 +95,9 @@ def _choice(text: str) -> Choice:
 
 
 def _say(notes: list[str]) -> None:
-    for note in notes[:MOST_NOTES]:
+    more = [f'and {len(notes) - MOST_NOTES} more'] * (len(notes) > MOST_NOTES)
+    for note in notes[:MOST_NOTES] + more:
         print(f'abs_report: note: {clean(note, 1000)}', file=sys.stderr)
-    if len(notes) > MOST_NOTES:
-        print(f'abs_report: note: and {len(notes) - MOST_NOTES} more', file=sys.stderr)
 
 
 def _check_replaceable(path: pathlib.Path, replace: bool) -> None:

@@ -1,5 +1,6 @@
 """What a run's rows say as a whole: phases, braking, figures of merit, changes of the simulated rig."""
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -95,7 +96,7 @@ def survey(run: RunFiles, rows: Run) -> Survey:
             name = next(phase.shown for phase in reversed(found.phases) if phase.from_s <= time[first])
             found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}',
                                    figures_of(rows.columns, run.config, first, last)))
-    found.changes = _changes(run, rows, found.r2_m)
+    found.changes = [*_changes(run, rows, found.r2_m)]
     return found
 
 
@@ -110,12 +111,11 @@ def _pulses(rows: Run, start: int, end: int) -> np.ndarray:
     return start + np.union1d(again, steps)
 
 
-def _changes(run: RunFiles, rows: Run, r2_m: float) -> list[Change]:
+def _changes(run: RunFiles, rows: Run, r2_m: float) -> Iterator[Change]:
     """When the parameters of the simulated rig changed according to the configuration; only what the run reached.
 
     Unknown distances reach nothing. A profile that cannot be read, as of another version, is left out.
     """
-    changes: list[Change] = []
     time, braking = rows.columns['time_s'], rows.columns['phase'] == 'brake'
     rolled = None
     for what in _PROFILES:
@@ -141,8 +141,7 @@ def _changes(run: RunFiles, rows: Run, r2_m: float) -> list[Change]:
             if not len(reached):
                 break
             at = origin + begin if axis == 'time' else time[first + reached[0]]
-            changes.append(Change(float(at), what.replace('_', ' ') + (f' × {value:.3g}' if slope == 0.0 else ' drifts')))
-    return changes
+            yield Change(float(at), what.replace('_', ' ') + (f' × {value:.3g}' if slope == 0.0 else ' drifts'))
 
 
 def value_of(metric: FigureOfMerit, run: RunFiles, found: Survey) -> float:

@@ -50,13 +50,9 @@ def _model_note(run: RunFiles) -> str:
 
 def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, str]:
     """The figures of merit, and what all of many runs share as one sentence."""
-    pair = len(runs) == 2
-    table = Table('metrics', ['', *(run.label for run in runs), *(['second relative to first'] if pair else [])], [])
+    header = ['', *(run.label for run in runs), *['second relative to first'] * (len(runs) == 2)]
+    rows: dict[str, list[str]] = {}
     shared = []
-
-    def add(name: str, cells: list[str], last: str = '') -> None:
-        table.rows.append([name, *cells, *([last] if pair else [])])
-
     for key in ('result', 'reason', 'experiment', 'controller', 'plant', 'backend'):
         cells = [run.text(key) or DASH for run in runs]
         if all(cell == DASH for cell in cells):
@@ -64,20 +60,20 @@ def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, s
         if len(runs) > MOST_COLUMNS and len(set(cells)) == 1:
             shared.append(f'{key}: {cells[0]}')
         else:
-            add(key, cells)
+            rows[key] = cells
     models = [_model_note(run) for run in runs]
     if any(models):
-        add('model differs from plant', [model or DASH for model in models])
-    add('speeds and slip', ['truth' if 'omega2_rad_s' in found.known else 'estimates' for found in surveys])
+        rows['model differs from plant'] = [model or DASH for model in models]
+    rows['speeds and slip'] = ['truth' if 'omega2_rad_s' in found.known else 'estimates' for found in surveys]
     for metric in merits_shown():
         values = [value_of(metric, run, found) for run, found in zip(runs, surveys)]
-        if not any(math.isfinite(value) for value in values):
-            continue
-        add(metric.heading, [shown(value, metric.decimals) for value in values],
-            _change(values[0], values[1]) if pair and metric.better == 'less' else '')
-    add('rows in the CSV', [str(found.rows) for found in surveys])
-    add('run', [run.name for run in runs])
-    return table.arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''
+        if any(math.isfinite(value) for value in values):
+            changes = [_change(*values)] if len(runs) == 2 and metric.better == 'less' else []
+            rows[metric.heading] = [shown(value, metric.decimals) for value in values] + changes
+    rows['rows in the CSV'] = [str(found.rows) for found in surveys]
+    rows['run'] = [run.name for run in runs]
+    lines = [[name, *cells, *[''] * (len(header) - 1 - len(cells))] for name, cells in rows.items()]
+    return Table('metrics', header, lines).arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''
 
 
 def phases_table(runs: list[RunFiles], surveys: list[Survey]) -> Table:
@@ -98,21 +94,17 @@ def merits(runs: list[RunFiles], surveys: list[Survey]) -> pandas.DataFrame:
 
 def timing_table(runs: list[RunFiles]) -> Table:
     timed = [run for run in runs if math.isfinite(run.number('cycle_time_us.p50'))]
-    table = Table('timing', ['µs', *(run.label for run in timed)], [])
-    if not timed:
-        return table
-    for key, part in (('wakeup_latency_us', 'wake-up latency'), ('read_us', 'read'), ('control_us', 'control'),
-                      ('write_us', 'write'), ('cycle_time_us', 'whole cycle')):
-        for quantile, name in (('p50', 'median'), ('p99', '99 %'), ('p99_9', '99.9 %'), ('max', 'greatest')):
-            table.rows.append([f'{part}, {name}', *(shown(run.number(f'{key}.{quantile}'), 0) for run in timed)])
-    for name, key in (('cycles', 'cycles'), ('late cycles', 'overruns'), ('late at start-up', 'overruns_startup'),
-                      ('longest run of late cycles', 'overruns_longest_run'), ('ticks missed', 'ticks_missed'),
-                      ('records lost', 'telemetry_drops')):
-        table.rows.append([name, *(shown(run.number(key), 0) for run in timed)])
-    table.rows.append(['verdict on the wheels overdue, % of the time',
-                       *(shown(100.0 * run.number('checks_unjudged'), 1) for run in timed)])
-    table.rows.append(['real time obtained', *('yes' if run.summary.get('realtime') is True else 'no' for run in timed)])
-    return table.arranged(len(timed))
+    numbers = {f'{part}, {name}': f'{key}.{quantile}'
+               for key, part in (('wakeup_latency_us', 'wake-up latency'), ('read_us', 'read'), ('control_us', 'control'),
+                                 ('write_us', 'write'), ('cycle_time_us', 'whole cycle'))
+               for quantile, name in (('p50', 'median'), ('p99', '99 %'), ('p99_9', '99.9 %'), ('max', 'greatest'))}
+    numbers |= {'cycles': 'cycles', 'late cycles': 'overruns', 'late at start-up': 'overruns_startup',
+                'longest run of late cycles': 'overruns_longest_run', 'ticks missed': 'ticks_missed',
+                'records lost': 'telemetry_drops'}
+    rows = [[name, *(shown(run.number(key), 0) for run in timed)] for name, key in numbers.items()]
+    rows += [['verdict on the wheels overdue, % of the time', *(shown(100.0 * run.number('checks_unjudged'), 1) for run in timed)],
+             ['real time obtained', *('yes' if run.summary.get('realtime') is True else 'no' for run in timed)]]
+    return Table('timing', ['µs', *(run.label for run in timed)], rows if timed else []).arranged(len(timed))
 
 
 def differences_table(runs: list[RunFiles]) -> Table:

@@ -133,9 +133,8 @@ class Feed:
         before = cycles.places(cycles.head - MOST_IN_WINDOW, cycles.head)
         known = np.concatenate((cycles.values[before[cycles.run[before] == run.number]], rows))
         time_s = known[:, PLACE['time_s']]
-        for last in np.flatnonzero(np.diff(self.history.bin_numbers(time_s), append=-1)).tolist():
-            if last < len(known) - len(rows):
-                continue
+        ends = np.flatnonzero(np.diff(self.history.bin_numbers(time_s), append=-1))
+        for last in ends[ends >= len(known) - len(rows)].tolist():
             first = int(np.searchsorted(time_s, time_s[last] - 2 * HALF_WINDOW_S))
             if (found := force_point(known[first:last + 1], run.config)) is not None:
                 rows[last - len(known), DERIVED_PLACE:] = found

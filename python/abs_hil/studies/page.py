@@ -267,12 +267,10 @@ def reasons_table(results: StudyResults) -> Table:
 def worst_table(results: StudyResults, metrics: list[str]) -> Table:
     """The completed runs with the largest values of metrics of which less is better."""
     names = ['run', *curve_names(results), *numeric_factors(results)]
-    rows = []
-    for metric in metrics:
-        if metric in figures() and figures()[metric].better == 'less':
-            for _, row in results.completed([*names, metric]).nlargest(WORST, metric).iterrows():
-                rows.append([heading_of(metric), significant(row[metric], 4),
-                             *(value if isinstance(value := row[name], str) else f'{value:.5g}' for name in names)])
+    rows = [[heading_of(metric), significant(row[metric], 4),
+             *(value if isinstance(value := row[name], str) else f'{value:.5g}' for name in names)]
+            for metric in metrics if metric in figures() and figures()[metric].better == 'less'
+            for _, row in results.completed([*names, metric]).nlargest(WORST, metric).iterrows()]
     return Table('worst', ['of', 'value', *(title_of(name) for name in names)], rows, False)
 
 

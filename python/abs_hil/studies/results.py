@@ -5,7 +5,6 @@ import os
 import pathlib
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -66,11 +65,15 @@ class StudyResults:
 
     def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Iterator[pandas.DataFrame]:
         """The rows as an iterator of DataFrames of at most `rows` rows: for studies that do not fit into the memory."""
-        with gzip.open(self.path, 'rb') as file, _whole(self.path):
-            yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
-                                       dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
-                                       keep_default_na=False, float_precision='round_trip',
-                                       na_values={name: ['nan'] for name in [*self.factors, *self.metrics]})
+        try:
+            with gzip.open(self.path, 'rb') as file:
+                yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
+                                           dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
+                                           keep_default_na=False, float_precision='round_trip',
+                                           na_values={name: ['nan'] for name in [*self.factors, *self.metrics]})
+        except (pandas.errors.ParserError, EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise ValueError(f'{self.path}: the rows are cut or damaged ({str(error).splitlines()[0]}); run or merge the study '
+                             'again') from None
 
     def columns(self, names: Sequence[str]) -> pandas.DataFrame:
         """Some columns of all rows, each once, one row a run, in order. Metrics of a run that has none are NaN."""
@@ -203,16 +206,6 @@ class StudyResults:
         finally:
             if writer is not None:
                 writer.close()
-
-
-@contextmanager
-def _whole(path: pathlib.Path) -> Iterator[None]:
-    """Says of rows that are cut or damaged what they are, instead of what a parser or a decompressor calls them."""
-    try:
-        yield
-    except (pandas.errors.ParserError, EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise ValueError(f'{path}: the rows are cut or damaged ({str(error).splitlines()[0]}); run or merge the study again'
-                         ) from None
 
 
 def _binned(values: pandas.Series, bins: int) -> pandas.Series:
