@@ -20,7 +20,7 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
-from .fit import COMPARED, RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
+from .fit import RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
 from .linear import keep_normals, run_filter, to_rest
 from .logs import Log, load_log, motion_of
@@ -108,7 +108,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     if finished.disturbances is not None:  # to disagree by less is no reason to refuse a rig
         keep_normals(of_all, run_filter(of_all, finished.disturbances.at_least())[1])
     found.disagreement = disagreement(of_all, finished.spread.scores)
-    if why := finished.misfit or _doubt(found, finished.fit):
+    if why := finished.misfit or _doubt(found):
         causes = finished.causes
         off = (causes[0].cause.acts if causes else
                DISTURBANCES[int(np.argmax(finished.disturbances.sd[:3]))] if finished.disturbances is not None else '')
@@ -119,19 +119,13 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     return found
 
 
-def _wanders_too_far(fit: Fit, odd: str = '') -> str:
-    """Says so of a fit that needs such a rig; empty if it does not. odd: the log that disagrees most."""
-    factor = max(fit.disturbances.sd[:3])
-    return '' if factor <= LARGEST_WANDER else (
-        f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of parameters '
-        f'only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
-
-
-def _doubt(found: Identified, fit: Fit) -> str:
+def _doubt(found: Identified) -> str:
     """Why the logs do not fit each other; empty if they do."""
     odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
-    if far := _wanders_too_far(fit, odd):
-        return far
+    factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
+    if factor > LARGEST_WANDER:
+        return (f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of '
+                f'parameters only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
         return (f'the model lacks something, or not all logs are of one rig in one state: the logs disagree, {odd} most '
                 f'(chi-square per degree of freedom {found.disagreement[odd]:.3g}, expected 1). If the brake was weaker in some '
@@ -202,9 +196,6 @@ def _explained(fit: Fit, seed: int) -> Finished:
     fit = disturbed_fit(flawed)
     limited = choices.sought(fit)
     fit = fit if limited is fit else disturbed_fit(limited)
-    # Disturbances may lead a fit past what held it up: where hardly any are left, it may follow the logs without them.
-    if max(fit.disturbances.sd[:3]) < COMPARED and (quiet := _quiet(finish_fit(fit.copy()))) is not None:
-        return _settled(quiet, seed)
     while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
         if (quiet := _quiet(found[0].without([RATE_LIMIT.key]))) is not None:
             return _settled(quiet, seed)
@@ -221,7 +212,7 @@ def _explained(fit: Fit, seed: int) -> Finished:
         causes = []
     elif causes and structure.named(causes):
         misfit = structure.sentence(causes, fit)
-    elif causes and not (misfit := _wanders_too_far(fit)):
+    elif causes:
         misfit = f'the model lacks something, most in {_most_left(fit)}; no single cause explains it'
     fit.problem.say('intervals')
     # What changed between the logs by more than chance makes all of them less certain (Birge 1932).
