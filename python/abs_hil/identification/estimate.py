@@ -20,7 +20,7 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, names_apart, stretches
 from . import choices, intervals, structure
-from .fit import RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
+from .fit import COMPARED, RESTS, disturbed_fit, finish_fit, level, likely_u0, search_u0, start_fit
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, disagreement, interrupted, leave_form_open, refuse
 from .linear import keep_normals, run_filter, to_rest
 from .logs import Log, load_log, motion_of
@@ -108,7 +108,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     if finished.disturbances is not None:  # to disagree by less is no reason to refuse a rig
         keep_normals(of_all, run_filter(of_all, finished.disturbances.at_least())[1])
     found.disagreement = disagreement(of_all, finished.spread.scores)
-    if why := finished.misfit or _doubt(found):
+    if why := finished.misfit or _doubt(found, finished.fit):
         causes = finished.causes
         off = (causes[0].cause.acts if causes else
                DISTURBANCES[int(np.argmax(finished.disturbances.sd[:3]))] if finished.disturbances is not None else '')
@@ -119,13 +119,19 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     return found
 
 
-def _doubt(found: Identified) -> str:
+def _wanders_too_far(fit: Fit, odd: str = '') -> str:
+    """Says so of a fit that needs such a rig; empty if it does not. odd: the log that disagrees most."""
+    factor = max(fit.disturbances.sd[:3])
+    return '' if factor <= LARGEST_WANDER else (
+        f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of parameters '
+        f'only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
+
+
+def _doubt(found: Identified, fit: Fit) -> str:
     """Why the logs do not fit each other; empty if they do."""
     odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
-    factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
-    if factor > LARGEST_WANDER:
-        return (f'the fit did not get there, or the logs are not of one rig{f", {odd} most" if odd else ""}: with one set of '
-                f'parameters only a rig that wanders by {100 * factor:.2g} % would explain them. Nothing is said of the rig')
+    if far := _wanders_too_far(fit, odd):
+        return far
     if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
         return (f'the model lacks something, or not all logs are of one rig in one state: the logs disagree, {odd} most '
                 f'(chi-square per degree of freedom {found.disagreement[odd]:.3g}, expected 1). If the brake was weaker in some '
@@ -136,28 +142,32 @@ def _doubt(found: Identified) -> str:
 def _likelier(fits: Sequence[Fit], seed: int) -> Finished:
     """The first form that follows the logs without disturbances, else the first that needs nothing which the plant lacks, else the
     first."""
+    near: list[Fit] = []
     for fit in fits:
         fit.problem.say(f'{fit.problem.form.meaning}: fit')
-        if (quiet := _quiet(fit)) is not None:
+        if (quiet := _quiet(fit, near)) is not None:
             return _settled(quiet, seed)
     done: list[Finished] = []
     failed = ''
     for fit in fits:
         try:
-            done.append(_explained(fit, seed))
+            done.append(_explained(fit, seed, near))
         except (ValueError, np.linalg.LinAlgError) as error:
             failed = failed or f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
         if done and (not done[-1].misfit and (len(done) == 1 or done[-1].disturbances is None)):
             return done[-1]
     if not done:
         raise ValueError(failed)
+    if done[0].misfit and near:  # what another fit lacks says nothing then
+        done[0].misfit, done[0].causes = _not_there(near[0]), []
     return done[0]
 
 
-def _quiet(fit: Fit) -> Fit | None:
+def _quiet(fit: Fit, near: list[Fit] | None = None) -> Fit | None:
     """The fit as if nothing disturbed the rig but the counts' steps, if it follows the logs so: as it is, or with duties as a
     board gives them; with late inputs and a limit of the brake's rate where the logs show them. Of duties that no board gives
-    as they are, the likeliest rounding counts: it may be too little to be seen in the residual, and yet move the parameters."""
+    as they are, the likeliest rounding counts: it may be too little to be seen in the residual, and yet move the parameters.
+    near: gets a fit that follows the logs and does not rest."""
     stopped = 0.0
     best = None
     for takes_up, tried in itertools.chain([(np.inf, fit)], choices.with_steps(fit)):
@@ -171,6 +181,8 @@ def _quiet(fit: Fit) -> Fit | None:
                     found = more
         except (ValueError, np.linalg.LinAlgError):
             continue
+        if near is not None and found.follows and not found.last_step < RESTS:
+            near.append(found)
         if left := _left_by(found):
             fit.problem.say(left)
         elif any(choices.are_given_in(fit, steps) for steps in choices.PWM_STEPS):
@@ -187,7 +199,7 @@ def _settled(quiet: Fit, seed: int) -> Finished:
     return Finished(quiet, intervals.bootstrap(quiet, seed), gaps, None, round_discs)
 
 
-def _explained(fit: Fit, seed: int) -> Finished:
+def _explained(fit: Fit, seed: int, near: list[Fit]) -> Finished:
     """The fit with the flaws that the logs show; of a rig that wanders, unless it follows the logs with them."""
     fit.problem.say(f'{fit.problem.form.meaning}: the rig wanders, or the model lacks something')
     flawed, first_causes = _flawed(fit)
@@ -196,6 +208,9 @@ def _explained(fit: Fit, seed: int) -> Finished:
     fit = disturbed_fit(flawed)
     limited = choices.sought(fit)
     fit = fit if limited is fit else disturbed_fit(limited)
+    # Disturbances may lead a fit past what held it up: where hardly any are left, it may follow the logs without them.
+    if max(fit.disturbances.sd[:3]) < COMPARED and (quiet := _quiet(fit, near)) is not None:
+        return _settled(quiet, seed)
     while (found := structure.explained(fit, fit.disturbances))[0] is not fit:
         if (quiet := _quiet(found[0].without([RATE_LIMIT.key]))) is not None:
             return _settled(quiet, seed)
@@ -207,12 +222,10 @@ def _explained(fit: Fit, seed: int) -> Finished:
     gaps = likely_u0(fit)
     misfit = ''
     if not (fit.last_step < RESTS and fit.rms_counts <= LARGEST_RMS):
-        misfit = (f'the fit did not get there (last step {fit.last_step:.3g} standard deviations, residual {fit.rms_counts:.3g} '
-                  f'counts RMS): nothing is said of the rig. Most is left in {_most_left(fit)}')
-        causes = []
+        misfit, causes = _not_there(fit), []
     elif causes and structure.named(causes):
         misfit = structure.sentence(causes, fit)
-    elif causes:
+    elif causes and not (misfit := _wanders_too_far(fit)):
         misfit = f'the model lacks something, most in {_most_left(fit)}; no single cause explains it'
     fit.problem.say('intervals')
     # What changed between the logs by more than chance makes all of them less certain (Birge 1932).
@@ -220,6 +233,11 @@ def _explained(fit: Fit, seed: int) -> Finished:
     unsure = 0.0 if misfit else structure.unsettled(fit, fit.disturbances)
     spread = intervals.information(fit, unsure, birge if birge > CHANCE else 1.0)
     return Finished(fit, spread, gaps, fit.disturbances, round_discs, causes, misfit)
+
+
+def _not_there(fit: Fit) -> str:
+    return (f'the fit did not get there (last step {fit.last_step:.3g} standard deviations, residual {fit.rms_counts:.3g} counts '
+            f'RMS): nothing is said of the rig. Most is left in {_most_left(fit)}')
 
 
 def _most_left(fit: Fit) -> str:

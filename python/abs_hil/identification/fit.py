@@ -33,7 +33,7 @@ COMPARED = 1e-3
 #: a fit rests at a level when a step goes less far than this, in standard deviations; it has so many steps for it
 RESTS = 1.0
 MOST_AT_A_LEVEL = 6
-MOST_QUIET = 24
+MOST_QUIET = 64
 #: of what a residual is above its bound: a step that takes less off is the last
 GAINLESS = 0.02
 #: an eccentricity below this sways no first value, rad
