@@ -8,6 +8,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -18,11 +19,13 @@
 #include "abs_hil/rig/quantities.hpp"
 #include "abs_hil/rig/signals.hpp"
 #include "abs_hil/telemetry_t.hpp"
+#include "analysis/friction_curve.hpp"
 #include "analysis/run_metrics.hpp"
 #include "array.hpp"
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "files/result_file.hpp"
+#include "rig/encoder_scale.hpp"
 #include "rig/formatted_text.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
@@ -217,6 +220,35 @@ void write_result(const std::string& path, const py::function& write, bool probe
 
 using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
+/// (slip, force in N) in the middle of a window of 60 ms; None where it cannot be known.
+/// @param samples  (rows, 3): time_s, and the counts of the upper and the lower wheel, which wrap around at 32 bit
+std::optional<std::pair<double, double>> friction_point(const Column& samples, double r1_m, double r2_m,
+                                                        double J2_kg_m2, double d2_Nms_rad, double M20_Nm,
+                                                        std::int32_t counts_per_rev) {
+  const auto at = samples.unchecked<2>();
+  std::vector<analysis::EncoderSample> window;
+  std::array<std::int32_t, 2> last{};
+  for (py::ssize_t n = 0; n < at.shape(0); ++n) {
+    const auto counts = [&](int column) { return static_cast<std::int32_t>(static_cast<std::int64_t>(at(n, column))); };
+    const std::array now{counts(1), counts(2)};
+    const analysis::EncoderSample before = window.empty() ? analysis::EncoderSample{0.0, 0, 0} : window.back();
+    if (window.empty()) last = now;
+    window.push_back({at(n, 0), before.upper + rig::counts_between(last[0], now[0]),
+                      before.lower + rig::counts_between(last[1], now[1])});
+    last = now;
+  }
+  if (window.empty() || counts_per_rev <= 0 || !(r2_m > 0.0)) return std::nullopt;
+  rig::WheelParameters wheels;
+  wheels.r1_m = r1_m;
+  wheels.r2_m = r2_m;
+  wheels.J2_kg_m2 = J2_kg_m2;
+  wheels.d2_Nms_rad = d2_Nms_rad;
+  wheels.M20_Nm = M20_Nm;
+  const analysis::EncoderSample middle{0.5 * (window.front().time_s + window.back().time_s), 0, 0};
+  const auto point = analysis::friction_point(window, middle, wheels, rig::radians_per_count(counts_per_rev));
+  return point ? std::optional(std::pair(point->slip, point->force_N)) : std::nullopt;
+}
+
 /// The figures of merit of rows, as a run's summary has them.
 /// @param columns  a column for each name below, of equal length; `braking` is 1 in phase brake
 py::dict metrics_of(const py::dict& columns, double r2_m, double end_speed_m_s) {
@@ -333,6 +365,8 @@ void add_files(py::module_& module) {
       "chosen_run",
       [](const std::string& name, std::size_t runs) { return chosen_run(telemetry::NamedRecording(name), runs); },
       py::arg("name"), py::arg("runs"));
+  module.def("friction_point", &friction_point);
+  module.attr("FRICTION_HALF_WINDOW_S") = analysis::friction_half_window_s;
   module.def("metrics_of", &metrics_of, py::arg("columns"), py::arg("r2_m"), py::arg("end_speed_m_s"));
   module.def("csv_rows", &csv_rows, py::arg("columns"));
   module.def("profile_of", &profile_of, py::arg("text"), py::arg("key"));

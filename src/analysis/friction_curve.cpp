@@ -15,7 +15,7 @@ namespace abs_hil::analysis {
 
 namespace {
 
-constexpr double half_window_s = 0.03;
+constexpr double half_window_s = friction_half_window_s;
 constexpr std::size_t least_samples = 12;  ///< per window: enough samples to average over a cubic
 constexpr double slow_m_s = 1.0;           ///< below this speed slip is mostly encoder error
 constexpr double near_peak = 0.85;         ///< points above this share of the largest force define the peak
@@ -87,6 +87,27 @@ void find_peak(FrictionCurveResult& result) {
 
 }  // namespace
 
+std::optional<FrictionPoint> friction_point(std::span<const EncoderSample> window, const EncoderSample& middle,
+                                            const rig::WheelParameters& wheels, double rad_per_count) {
+  if (window.size() < least_samples) return std::nullopt;
+  CubicFit<2> fit;
+  for (const EncoderSample& sample : window) {
+    fit.add((sample.time_s - middle.time_s) / half_window_s,
+            {static_cast<double>(sample.upper - middle.upper) * rad_per_count,
+             static_cast<double>(sample.lower - middle.lower) * rad_per_count});
+  }
+  const Eigen::Matrix<double, 4, 2> cubics = fit.coefficients();
+  const Motion upper = motion_of(cubics, 0);
+  const Motion lower = motion_of(cubics, 1);
+  const double v_x_m_s = wheels.r2_m * lower.omega_rad_s;
+  if (!(v_x_m_s >= slow_m_s)) return std::nullopt;
+  return FrictionPoint{
+      .time_s = middle.time_s,
+      .slip = rig::wheel_slip(wheels.r1_m * upper.omega_rad_s, v_x_m_s, slow_m_s),
+      .force_N = -(wheels.J2_kg_m2 * lower.alpha_rad_s2 + wheels.d2_Nms_rad * lower.omega_rad_s + wheels.M20_Nm) /
+                 wheels.r2_m};
+}
+
 FrictionCurve::FrictionCurve(const rig::WheelParameters& wheels, std::int32_t counts_per_rev)
     : wheels_(wheels), rad_per_count_(rig::radians_per_count(counts_per_rev)) {}
 
@@ -97,7 +118,7 @@ void FrictionCurve::consume(const rig::CycleRecord& record, double /*distance_m*
     start_ns_ = m.time_ns;
     samples_.push_back({0.0, 0, 0});
   } else {
-    const Sample& last = samples_.back();
+    const EncoderSample& last = samples_.back();
     samples_.push_back({static_cast<double>(m.time_ns - start_ns_) * 1e-9,
                         last.upper + rig::counts_between(last_upper_, m.upper_counts),
                         last.lower + rig::counts_between(last_lower_, m.lower_counts)});
@@ -111,28 +132,13 @@ FrictionCurveResult FrictionCurve::result() const {
   const double last_s = samples_.empty() ? 0.0 : samples_.back().time_s;
   std::size_t first = 0;
   std::size_t end = 0;
-  for (const Sample& middle : samples_) {
+  for (const EncoderSample& middle : samples_) {
     if (middle.time_s < half_window_s || middle.time_s > last_s - half_window_s) continue;
     while (samples_[first].time_s < middle.time_s - half_window_s) ++first;
     while (end < samples_.size() && samples_[end].time_s <= middle.time_s + half_window_s) ++end;
-    if (end - first < least_samples) continue;
-    CubicFit<2> fit;
-    for (std::size_t i = first; i < end; ++i) {
-      const Sample& sample = samples_[i];
-      fit.add((sample.time_s - middle.time_s) / half_window_s,
-              {static_cast<double>(sample.upper - middle.upper) * rad_per_count_,
-               static_cast<double>(sample.lower - middle.lower) * rad_per_count_});
-    }
-    const Eigen::Matrix<double, 4, 2> cubics = fit.coefficients();
-    const Motion upper = motion_of(cubics, 0);
-    const Motion lower = motion_of(cubics, 1);
-    const double v_x_m_s = wheels_.r2_m * lower.omega_rad_s;
-    if (v_x_m_s < slow_m_s) continue;
-    result.points.push_back(
-        {.time_s = middle.time_s,
-         .slip = rig::wheel_slip(wheels_.r1_m * upper.omega_rad_s, v_x_m_s, slow_m_s),
-         .force_N = -(wheels_.J2_kg_m2 * lower.alpha_rad_s2 + wheels_.d2_Nms_rad * lower.omega_rad_s + wheels_.M20_Nm) /
-                    wheels_.r2_m});
+    if (const auto point =
+            friction_point(std::span(samples_).subspan(first, end - first), middle, wheels_, rad_per_count_))
+      result.points.push_back(*point);
   }
   find_peak(result);
   return result;

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,21 @@ struct FrictionCurveResult {
   double peak_slip{rig::unknown};
 };
 
+/// One reading of both encoders.
+struct EncoderSample {
+  double time_s;       ///< since any moment
+  std::int64_t upper;  ///< counts, unwrapped
+  std::int64_t lower;
+};
+inline constexpr double friction_half_window_s = 0.03;
+
+/// The point in the middle of a window of samples, which reaches over friction_half_window_s on either side; nothing if
+/// it has too few of them, or the lower wheel is too slow for a slip.
+/// @param middle  time and counts that the cubics count from
+[[nodiscard]] std::optional<FrictionPoint> friction_point(std::span<const EncoderSample> window,
+                                                          const EncoderSample& middle,
+                                                          const rig::WheelParameters& wheels, double rad_per_count);
+
 /// Traces the friction curve over phase `brake` from the counts of both encoders and their reading times alone:
 ///   force = -(J2 omega2' + d2 omega2 + M20) / r2  (2),   slip (5) from both speeds.
 /// Speeds and deceleration come from least-squares cubics through the counts within 30 ms on either side. These have no
@@ -37,15 +54,9 @@ class FrictionCurve final : public rig::RecordSink {
   [[nodiscard]] FrictionCurveResult result() const;
 
  private:
-  struct Sample {
-    double time_s;       ///< time of the reading since the first sample
-    std::int64_t upper;  ///< counts, unwrapped
-    std::int64_t lower;
-  };
-
   rig::WheelParameters wheels_;
   double rad_per_count_;
-  std::vector<Sample> samples_;
+  std::vector<EncoderSample> samples_;  ///< times since the first one
   std::int64_t start_ns_{0};
   std::int32_t last_upper_{0};
   std::int32_t last_lower_{0};

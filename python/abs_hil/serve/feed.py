@@ -24,10 +24,7 @@ MOST_PACKETS = 5000
 LATE_CYCLES = 16
 #: cycles of 60 ms at 10 kHz
 MOST_IN_WINDOW = 600
-#: of a point of the tyre's force over slip: its window, the fewest cycles in it, the least speed
-HALF_WINDOW_S = 0.03
-LEAST_SAMPLES = 12
-SLOW_M_S = 1.0
+_MODEL = ('r1_m', 'r2_m', 'J2_kg_m2', 'd2_Nms_rad', 'M20_Nm')
 BRAKE = PHASES.index('brake')
 
 
@@ -135,37 +132,25 @@ class Feed:
         time_s = known[:, PLACE['time_s']]
         ends = np.flatnonzero(np.diff(self.history.bin_numbers(time_s), append=-1))
         for last in ends[ends >= len(known) - len(rows)].tolist():
-            first = int(np.searchsorted(time_s, time_s[last] - 2 * HALF_WINDOW_S))
+            first = int(np.searchsorted(time_s, time_s[last] - 2 * _core.FRICTION_HALF_WINDOW_S))
             if (found := force_point(known[first:last + 1], run.config)) is not None:
                 rows[last - len(known), DERIVED_PLACE:] = found
 
 
 def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float] | None:
-    """(slip, force in N) from the cycles of one window; None where it cannot be known. Cubics through both encoders' angles
-    over 60 ms give speed and deceleration in their middle, and the lower wheel's balance of torques gives the force (as
-    src/analysis/friction_curve.cpp does after a run).
+    """(slip, force in N) from the cycles of one window, by the program's own friction curve (src/analysis/friction_curve.hpp); None
+    where it cannot be known.
 
     config: the run's effective configuration. The model's parameters count, on the real rig the only ones.
     """
     model = {**config.get('plant', {}), **config.get('model', {})}
+    samples = rows[:, [PLACE[name] for name in ('sample_time_s', 'upper_counts', 'lower_counts')]]
+    if (rows[:, PLACE['phase']] != BRAKE).any() or not np.isfinite(samples).all():
+        return None
     try:
-        r1_m, r2_m, J2_kg_m2, d2_Nms_rad, M20_Nm, counts_per_rev = (
-            float(model[name]) for name in ('r1_m', 'r2_m', 'J2_kg_m2', 'd2_Nms_rad', 'M20_Nm', 'encoder_counts_per_rev'))
+        return _core.friction_point(samples, *(float(model[name]) for name in _MODEL), int(model['encoder_counts_per_rev']))
     except (KeyError, TypeError, ValueError):
         return None
-    if len(rows) < LEAST_SAMPLES or (rows[:, PLACE['phase']] != BRAKE).any() or counts_per_rev <= 0 or r2_m <= 0:
-        return None
-    time_s = rows[:, PLACE['sample_time_s']]
-    scaled = (time_s - (time_s[0] + time_s[-1]) / 2) / HALF_WINDOW_S
-    counts = rows[:, [PLACE['upper_counts'], PLACE['lower_counts']]].astype(np.int64)
-    angles = np.unwrap(counts - counts[0], axis=0, period=1 << 32) * (2 * np.pi / counts_per_rev)  # they wrap around at 32 bit
-    if not np.isfinite(scaled).all():
-        return None
-    _, first, second, _ = np.linalg.lstsq(np.vander(scaled, 4, increasing=True), angles, rcond=None)[0]
-    omega, alpha = first / HALF_WINDOW_S, 2 * second / HALF_WINDOW_S ** 2
-    if (v_x_m_s := r2_m * omega[1]) < SLOW_M_S:
-        return None
-    return 1 - r1_m * omega[0] / v_x_m_s, -(J2_kg_m2 * alpha[1] + d2_Nms_rad * omega[1] + M20_Nm) / r2_m
 
 
 class Played:
