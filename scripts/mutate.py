@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate, its plausibility checks and limits, of what values weaken them, of the guard of a
+Mutation run of the cycle, the command gate, its plausibility checks and limits, of what values weaken them, of the guard of a
 board, and of the node's core (firmware/). The script changes one place at a time in their sources (a relation, an
 operator, a constant, a condition, a statement left out), compiles only that file or, for a header, the source that uses it, without
 optimisation, links it with the tests of its group and runs them. A mutant that the tests do not notice survives.
@@ -52,10 +52,19 @@ GUARD = Group('guardian', ['board_guard', 'watchdog', 'standby'],
                '"guardian/mail.hpp"', '"guardian/shared_region.hpp"', '"runtime/clock.hpp"'),
               unchanged=('guardian/linux_process.cpp', 'guardian/mail.cpp', 'guardian/shared_region.cpp'),
               libraries=('files', 'runtime', 'driver', 'rig'))
+EXECUTIVE = Group('runtime', ['cyclic_executive'],
+                  ['runtime/cyclic_executive_test.cpp', 'runtime/executive_duties_test.cpp', 'runtime/overrun_test.cpp',
+                   'runtime/taken_back_test.cpp'],
+                  ('<algorithm>', '<atomic>', '<utility>', '"abs_hil/driver/rig_driver.hpp"', '"runtime/clock.hpp"',
+                   '"runtime/command_gate.hpp"', '"runtime/cycle_statistics.hpp"', '"runtime/spsc_ring.hpp"'),
+                  unchanged=('driver/rig_driver.cpp', 'rig/safety_class.cpp',
+                             *(f'runtime/{name}.cpp' for name in ('clock', 'command_gate', 'cycle_statistics', 'encoder_check', 'heartbeat',
+                                                                  'plausibility_limits', 'record_pump', 'response_check',
+                                                                  'run_latch', 'speed_window'))))
 NODE = Group('', ['node_core'], ['firmware/node_*_test.cpp'], ('<stdint.h>',), top='firmware', suffix='.c')
 # File -> its group and the sources that are compiled for its mutants. Of the header of the gate and of constructors in
 # headers the tests have their own copies: they cannot be tried like this.
-FILES = {f'{name}.cpp': (group, [name]) for group in (GATE, GUARD) for name in group.sources} | {
+FILES = {f'{name}.cpp': (group, [name]) for group in (GATE, GUARD, EXECUTIVE) for name in group.sources} | {
     'speed_window.hpp': (GATE, ['speed_window', 'encoder_check', 'response_check']),
     'node_core.c': (NODE, ['node_core']), 'wheel_watch.hpp': (GATE, ['encoder_check']), 'response_check.hpp': (GATE, ['response_check'])}
 COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests', '-I',

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -58,14 +59,24 @@ class ScriptedDriver final : public driver::RigDriver {
   ~ScriptedDriver() override { static_cast<void>(deactivate()); }
   [[nodiscard]] std::string_view name() const noexcept override { return "scripted"; }
   void note_wheels_apart(bool now_apart) noexcept override { apart.push_back(now_apart); }
+  void note_phase(rig::Phase phase) noexcept override { phases.push_back(phase); }
+  [[nodiscard]] rig::PlantTruth truth() const noexcept override { return {.slip = 0.25}; }
+  [[nodiscard]] bool took_other_command(rig::Command& command) const noexcept override {
+    if (took) command = *took;
+    return took.has_value();
+  }
   std::int64_t stamp_lag_ns{0};  ///< the counters are read so long before the reading begins
 
   CycleScript script{};
   driver::IoResult read_result{};
   driver::IoResult write_result{};
   std::uint32_t trip_flags{0};
+  std::array<std::int32_t, 2> counts_per_cycle{};  ///< upper, lower
+  std::array<std::int32_t, 2> counts{};
   std::optional<rig::Command> sends;  ///< what it makes of every command; empty: the command
+  std::optional<rig::Command> took;   ///< what the board took instead of the command before; empty: that one
   std::vector<rig::Command> written;
+  std::vector<rig::Phase> phases;
   std::vector<bool> apart;  ///< what it was told about the wheels, in order
   int made_safe{0};
 
@@ -76,6 +87,9 @@ class ScriptedDriver final : public driver::RigDriver {
     clock_.pass(script.read_ns);
     measurement.time_ns = now_ns - stamp_lag_ns;
     measurement.trip_flags = trip_flags;
+    for (std::size_t i = 0; i < 2; ++i) counts[i] += counts_per_cycle[i];
+    measurement.upper_counts = counts[0];
+    measurement.lower_counts = counts[1];
     return read_result;
   }
   driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
@@ -113,12 +127,13 @@ class ScriptedLogic final : public CycleLogic {
     record.wheels_apart = wheels_apart;
     return finished_ ? rig::safe_command : wanted;
   }
-  void commanded(const rig::Command& command) noexcept override { last = command; }
+  void commanded(const rig::Command& command) noexcept override { told.push_back(last = command); }
   [[nodiscard]] bool finished() const noexcept override { return finished_; }
 
   CycleScript script{};
   rig::Command wanted{.brake_duty = 0.5};
   rig::Command last{};
+  std::vector<rig::Command> told;  ///< every command that acted, as the cycle told it
   bool wheels_sound{false};
   bool wheels_apart{false};
   rig::Reason ended_by{rig::Reason::none};
