@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -222,8 +223,8 @@ using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// (slip, force in N) in the middle of a window of 60 ms; None where it cannot be known.
 /// @param samples  (rows, 3): time_s, and the counts of the upper and the lower wheel, which wrap around at 32 bit
-std::optional<std::pair<double, double>> friction_point(const Column& samples, double r1_m, double r2_m,
-                                                        double J2_kg_m2, double d2_Nms_rad, double M20_Nm,
+/// @param parameters  r1_m, r2_m, J2_kg_m2, d2_Nms_rad, M20_Nm
+std::optional<std::pair<double, double>> friction_point(const Column& samples, const std::array<double, 5>& parameters,
                                                         std::int32_t counts_per_rev) {
   const auto at = samples.unchecked<2>();
   std::vector<analysis::EncoderSample> window;
@@ -237,13 +238,9 @@ std::optional<std::pair<double, double>> friction_point(const Column& samples, d
                       before.lower + rig::counts_between(last[1], now[1])});
     last = now;
   }
-  if (window.empty() || counts_per_rev <= 0 || !(r2_m > 0.0)) return std::nullopt;
   rig::WheelParameters wheels;
-  wheels.r1_m = r1_m;
-  wheels.r2_m = r2_m;
-  wheels.J2_kg_m2 = J2_kg_m2;
-  wheels.d2_Nms_rad = d2_Nms_rad;
-  wheels.M20_Nm = M20_Nm;
+  std::tie(wheels.r1_m, wheels.r2_m, wheels.J2_kg_m2, wheels.d2_Nms_rad, wheels.M20_Nm) = std::tuple_cat(parameters);
+  if (window.empty() || counts_per_rev <= 0 || !(wheels.r2_m > 0.0)) return std::nullopt;
   const analysis::EncoderSample middle{0.5 * (window.front().time_s + window.back().time_s), 0, 0};
   const auto point = analysis::friction_point(window, middle, wheels, rig::radians_per_count(counts_per_rev));
   return point ? std::optional(std::pair(point->slip, point->force_N)) : std::nullopt;

@@ -138,7 +138,7 @@ class Feed:
 
 
 def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float] | None:
-    """(slip, force in N) from the cycles of one window, by the program's own friction curve (src/analysis/friction_curve.hpp); None
+    """(slip, force in N) from the cycles of one window, by the program's own friction curve (analysis/friction_curve.hpp); None
     where it cannot be known.
 
     config: the run's effective configuration. The model's parameters count, on the real rig the only ones.
@@ -148,7 +148,7 @@ def force_point(rows: np.ndarray, config: dict[str, Any]) -> tuple[float, float]
     if (rows[:, PLACE['phase']] != BRAKE).any() or not np.isfinite(samples).all():
         return None
     try:
-        return _core.friction_point(samples, *(float(model[name]) for name in _MODEL), int(model['encoder_counts_per_rev']))
+        return _core.friction_point(samples, [float(model[name]) for name in _MODEL], int(model['encoder_counts_per_rev']))
     except (KeyError, TypeError, ValueError):
         return None
 
