@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """test_summary.py RESULTS [LIST...]: what ctest says too briefly: what was shown, how many tests passed, failed and were
 skipped, and why.
-test_summary.py --key: a pattern of the tests of level key. test_summary.py --check < NAMES: whether each test has a claim.
+test_summary.py --key: a pattern of the tests of level key. test_summary.py --passed RESULTS: the names of those that passed.
+test_summary.py --check < NAMES: whether each test has a claim.
 
 RESULTS is the file of ctest --output-junit; the LISTs are the lists of packages that could not be installed. Status 1 if
 the environment has ABS_HIL_MAY_SKIP, a pattern, and a test of another name was skipped or a list is lacking. ABS_HIL_TEST_LEVEL
@@ -61,12 +62,15 @@ def reasons_of(test: ElementTree.Element) -> list[str]:
     return list(dict.fromkeys(found[1] or found[2] for found in REASONS.finditer(text)))
 
 
-def main(path: str, lacking: list[str]) -> int:
+def tests_of(path: str) -> list[ElementTree.Element]:
     try:
-        tests = ElementTree.parse(path).getroot().findall('testcase')
+        return ElementTree.parse(path).getroot().findall('testcase')
     except (OSError, ElementTree.ParseError) as error:
-        print(f'test: ctest has left no results: {error}', file=sys.stderr)
-        return 1
+        sys.exit(f'test: ctest has left no results: {error}')
+
+
+def main(path: str, lacking: list[str]) -> int:
+    tests = tests_of(path)
     named = {kind: [test for test in tests if test.get('status') in of]
              for kind, of in (('passed', ('run',)), ('failed', ('fail',)), ('skipped', ('notrun', 'disabled')))}
     print('\n'.join(['', *table(named)]))
@@ -92,5 +96,7 @@ def main(path: str, lacking: list[str]) -> int:
 if __name__ == '__main__':
     if sys.argv[1] == '--key':
         print('^(' + '|'.join(pattern for level, pattern, _ in claims() if level == 'key') + ')$')
+    elif sys.argv[1] == '--passed':
+        print('\n'.join(test.get('name', '') for test in tests_of(sys.argv[2]) if test.get('status') == 'run'))
     else:
         sys.exit(check(sys.stdin.read().split()) if sys.argv[1] == '--check' else main(sys.argv[1], sys.argv[2:]))
