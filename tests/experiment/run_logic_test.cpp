@@ -167,3 +167,11 @@ TEST_CASE("a controller goes on over consecutive phases that use it, unless the 
     if (!std::isnan(expected[600].control.theta_est_N)) CHECK(differing > 0);
   }
 }
+
+TEST_CASE("a run with injected faults is refused where nothing injects them") {
+  config::Settings settings;  // this program has no extra
+  settings.inject = "brake@write:off";
+  const run::Prepared prepared(settings);
+  CHECK_THROWS_WITH(run::Run(prepared), Catch::Matchers::Contains("run.inject = brake@write:off") &&
+                                            Catch::Matchers::Contains("-DABS_HIL_INJECTION=ON"));
+}
