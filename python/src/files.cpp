@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -239,7 +238,11 @@ std::optional<std::pair<double, double>> friction_point(const Column& samples, c
     last = now;
   }
   rig::WheelParameters wheels;
-  std::tie(wheels.r1_m, wheels.r2_m, wheels.J2_kg_m2, wheels.d2_Nms_rad, wheels.M20_Nm) = std::tuple_cat(parameters);
+  wheels.r1_m = parameters[0];
+  wheels.r2_m = parameters[1];
+  wheels.J2_kg_m2 = parameters[2];
+  wheels.d2_Nms_rad = parameters[3];
+  wheels.M20_Nm = parameters[4];
   if (window.empty() || counts_per_rev <= 0 || !(wheels.r2_m > 0.0)) return std::nullopt;
   const analysis::EncoderSample middle{0.5 * (window.front().time_s + window.back().time_s), 0, 0};
   const auto point = analysis::friction_point(window, middle, wheels, rig::radians_per_count(counts_per_rev));

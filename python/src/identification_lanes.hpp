@@ -11,7 +11,7 @@
 
 namespace abs_hil::python {
 
-using plant_sim::lanes::WindowKernel;
+using lanes::WindowKernel;
 
 /// Rows of a log, and what acts in them.
 struct Window {
@@ -47,7 +47,7 @@ class Lanes {
 template <template <class> class Tyre, template <class> class Load>
 class LanesOf : public Lanes {
  public:
-  using Plant = plant_sim::lanes::LanePlant<double, Tyre<double>, Load<double>>;
+  using Plant = lanes::LanePlant<double, Tyre<double>, Load<double>>;
 
   /// Null if these plants are of another kind.
   static std::unique_ptr<Lanes> of(const std::vector<const DelayedPlant*>& plants, study::lanes::InstructionSet set) {
@@ -129,8 +129,8 @@ class LanesOf : public Lanes {
     return plant;
   }
   static WindowKernel kernel_of(study::lanes::InstructionSet set) {
-    using Kind = plant_sim::lanes::WindowKind<Tyre, Load>;
-    using plant_sim::lanes::window_kernel;
+    using Kind = lanes::WindowKind<Tyre, Load>;
+    using lanes::window_kernel;
 #ifdef ABS_HIL_WIDE_LANES
     if (set == study::lanes::InstructionSet::avx512) return window_kernel<rig::Avx512, Kind>();
     if (set == study::lanes::InstructionSet::avx2) return window_kernel<rig::Avx2, Kind>();
@@ -149,18 +149,18 @@ class LanesOf : public Lanes {
   /// Of the plants from `begin` on; free lanes repeat the first of them.
   void take_duties(const std::vector<const Inputs*>& inputs, const Window& window, std::size_t begin,
                    std::size_t count) {
-    duties_.resize(durations_s_.size() * plant_sim::lanes::duties * kernel_.lanes);
+    duties_.resize(durations_s_.size() * lanes::duties * kernel_.lanes);
     double* to = duties_.data();
     for (std::ptrdiff_t row = window.first; row < window.last; ++row) {
       for (std::size_t lane = 0; lane < kernel_.lanes; ++lane, ++to) {
         const Inputs& own = *inputs[begin + (lane < count ? lane : 0)];
         const plant_sim::PlantInput now = own.at(row), earlier = own.before(row);
-        to[plant_sim::lanes::motor_duty * kernel_.lanes] = now.motor_duty;
-        to[plant_sim::lanes::brake_duty * kernel_.lanes] = now.brake_duty;
-        to[plant_sim::lanes::earlier_motor_duty * kernel_.lanes] = earlier.motor_duty;
-        to[plant_sim::lanes::earlier_brake_duty * kernel_.lanes] = earlier.brake_duty;
+        to[lanes::motor_duty * kernel_.lanes] = now.motor_duty;
+        to[lanes::brake_duty * kernel_.lanes] = now.brake_duty;
+        to[lanes::earlier_motor_duty * kernel_.lanes] = earlier.motor_duty;
+        to[lanes::earlier_brake_duty * kernel_.lanes] = earlier.brake_duty;
       }
-      to += (plant_sim::lanes::duties - 1) * kernel_.lanes;
+      to += (lanes::duties - 1) * kernel_.lanes;
     }
   }
   void copy(const std::vector<double>& from, std::vector<double>& to, std::size_t begin) const {

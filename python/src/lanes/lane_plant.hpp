@@ -16,7 +16,9 @@
 
 /// Plants of other parameters, states or duties that pass the same window side by side: what differences of simulations
 /// are made of. Compiled for each instruction set, as the lanes of a study are.
-namespace abs_hil::plant_sim::lanes {
+namespace abs_hil::python::lanes {
+
+using namespace plant_sim;
 
 /// The duties of one interval, a vector of lanes each. A lane whose inputs come late has the earlier ones until then.
 enum Duty : std::size_t { motor_duty, brake_duty, earlier_motor_duty, earlier_brake_duty, duties };
@@ -169,4 +171,4 @@ ABS_HIL_WINDOW_KINDS(ABS_HIL_WINDOW_KERNEL)
 #undef ABS_HIL_WINDOW_KERNEL
 #endif
 
-}  // namespace abs_hil::plant_sim::lanes
+}  // namespace abs_hil::python::lanes
